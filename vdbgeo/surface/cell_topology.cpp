@@ -1,0 +1,408 @@
+#include "vdbgeo/surface/cell_topology.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+namespace vdbgeo::cell {
+namespace {
+
+using Loop = std::vector<int>;  // edges whose crossings follow one another along a closed contour
+
+int edge_between(int a, int b) {
+    for (int e = 0; e < edges; ++e)
+        if (lower_corner(e) == std::min(a, b) && upper_corner(e) == std::max(a, b)) return e;
+    std::abort();
+}
+
+/// Corners of a face in the order that is counter-clockwise seen from outside the cell.
+std::array<int, 4> face_corners(int face) {
+    const int axis = face / 2, side = face % 2, u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3;
+    const int base = side << axis;
+    if (side == 1) return {base, base + u, base + u + v, base + v};
+    return {base, base + v, base + u + v, base + u};
+}
+
+bool inside(int sign_case, int corner) { return sign_case >> corner & 1; }
+
+bool is_ambiguous(int sign_case, int face) {
+    const auto q = face_corners(face);
+    return inside(sign_case, q[0]) == inside(sign_case, q[2]) && inside(sign_case, q[1]) == inside(sign_case, q[3]) &&
+           inside(sign_case, q[0]) != inside(sign_case, q[1]);
+}
+
+bool on_face(int edge, int face) {
+    const int axis = face / 2, side = face % 2;
+    return (lower_corner(edge) >> axis & 1) == side && (upper_corner(edge) >> axis & 1) == side;
+}
+
+bool share_a_face(int a, int b) {
+    for (int f = 0; f < faces; ++f)
+        if (on_face(a, f) && on_face(b, f)) return true;
+    return false;
+}
+
+/// The contours of all faces, chained into loops. Bit f of `joined`: on the ambiguous face f the inside corners
+/// are connected across it. Each loop runs counter-clockwise seen from the empty side.
+std::vector<Loop> trace_loops(int sign_case, int joined) {
+    std::array<int, edges> next;
+    next.fill(-1);
+    for (int f = 0; f < faces; ++f) {
+        const auto q = face_corners(f);
+        const bool swap = is_ambiguous(sign_case, f) && (joined >> f & 1);
+        for (int k = 0; k < 4; ++k) {  // an inside run begins at q[k]
+            if (inside(sign_case, q[(k + 3) % 4]) || !inside(sign_case, q[k])) continue;
+            int last = k;
+            while (inside(sign_case, q[(last + 1) % 4])) last = (last + 1) % 4;
+            const int enter = edge_between(q[(k + 3) % 4], q[k]), leave = edge_between(q[last], q[(last + 1) % 4]);
+            // Joined: the contour cuts off the empty corner before this run instead of the dense one.
+            next[enter] = swap ? edge_between(q[(k + 2) % 4], q[(k + 3) % 4]) : leave;
+        }
+    }
+    std::vector<Loop> loops;
+    std::array<bool, edges> seen{};
+    for (int e = 0; e < edges; ++e) {
+        if (next[e] < 0 || seen[e]) continue;
+        Loop loop;
+        for (int k = e; !seen[k]; k = next[k]) {
+            seen[k] = true;
+            loop.push_back(k);
+        }
+        loops.push_back(loop);
+    }
+    return loops;
+}
+
+/// Squared distance of two edges' midpoints, in quarter units.
+int distance2(int a, int b) {
+    int sum = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto place = [&](int e) { return (lower_corner(e) >> axis & 1) + (upper_corner(e) >> axis & 1); };
+        sum += (place(a) - place(b)) * (place(a) - place(b));
+    }
+    return sum;
+}
+
+// A diagonal inside a face of the cell could also be made by the neighbour cell, and four triangles would then
+// meet in it. So no edge between triangles may join two crossings of one face.
+constexpr int forbidden = 1 << 20;
+int diagonal_cost(int a, int b) { return share_a_face(a, b) ? forbidden : distance2(a, b); }
+
+void add(Pattern& p, int a, int b, int c) {
+    if (p.triangle_count >= max_triangles) std::abort();
+    p.triangles[p.triangle_count++] = {static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b),
+                                       static_cast<std::uint8_t>(c)};
+}
+
+/// Triangulates a disc bounded by the loop with the shortest allowed diagonals (dynamic programming over
+/// sub-polygons); where there are none, a fan about an extra vertex.
+void add_disc(Pattern& p, const Loop& loop) {
+    const int n = static_cast<int>(loop.size());
+    std::vector<std::vector<int>> cost(n, std::vector<int>(n, 0)), split(n, std::vector<int>(n, -1));
+    const auto side = [&](int i, int j) {
+        return j == i + 1 || (i == 0 && j == n - 1) ? 0 : diagonal_cost(loop[i], loop[j]);
+    };
+    for (int span = 2; span < n; ++span)
+        for (int i = 0; i + span < n; ++i) {
+            const int j = i + span;
+            cost[i][j] = std::numeric_limits<int>::max();
+            for (int k = i + 1; k < j; ++k) {
+                const int c = cost[i][k] + cost[k][j] + side(i, k) + side(k, j);
+                if (c < cost[i][j]) cost[i][j] = c, split[i][j] = k;
+            }
+        }
+    if (cost[0][n - 1] >= forbidden) {
+        const int centre = edges + p.centre_count;
+        for (int i = 0; i < n; ++i) {
+            p.centre_edges[p.centre_count] |= static_cast<std::uint16_t>(1 << loop[i]);
+            add(p, loop[i], loop[(i + 1) % n], centre);
+        }
+        ++p.centre_count;
+        return;
+    }
+    std::vector<std::pair<int, int>> open{{0, n - 1}};
+    while (!open.empty()) {
+        const auto [i, j] = open.back();
+        open.pop_back();
+        if (j - i < 2) continue;
+        const int k = split[i][j];
+        add(p, loop[i], loop[k], loop[j]);
+        open.push_back({i, k});
+        open.push_back({k, j});
+    }
+}
+
+/// A walk once around loop a forwards and once around loop b backwards, every step one triangle of the band between
+/// them: true for a step along a. It begins at the cross edge a[start_a] – b[start_b].
+struct Band {
+    std::vector<bool> along_a;
+    int start_a = 0, start_b = 0;
+};
+
+/// The walk with the shortest cross edges, by dynamic programming over the lattice of cross edges for every start.
+/// Returns its cost, `forbidden` or more where no walk does without a forbidden cross edge.
+template <class Cost>
+int find_band(const Loop& a, const Loop& b, const Cost& edge_cost, Band& band) {
+    const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
+    int best = std::numeric_limits<int>::max();
+    for (int start = 0; start < n * m; ++start) {
+        const int start_a = start % n, start_b = start / n;
+        std::vector<std::vector<int>> cost(n + 1, std::vector<int>(m + 1, 2 * forbidden));
+        std::vector<std::vector<bool>> from_a(n + 1, std::vector<bool>(m + 1, false));
+        cost[0][0] = 0;
+        // A walk begins along a and ends along b, and does not go around one loop at a stretch: it would come
+        // back to the same cross edge. So the lattice's side i = 0 and its corner (n, 0) are left out.
+        for (int i = 1; i <= n; ++i)
+            for (int j = 0; j <= m; ++j) {
+                if ((i == n && j == 0) || (i < n && j == m)) continue;
+                const int via_a = cost[i - 1][j], via_b = j > 0 ? cost[i][j - 1] : 2 * forbidden;
+                from_a[i][j] = via_a <= via_b;
+                const int step = edge_cost(a[(start_a + i) % n], b[(start_b - j + 2 * m) % m]);
+                cost[i][j] = std::min(2 * forbidden, std::min(via_a, via_b) + step);
+            }
+        if (cost[n][m] >= best) continue;
+        best = cost[n][m];
+        if (best >= forbidden) continue;
+        band = {{}, start_a, start_b};
+        for (int i = n, j = m; i + j > 0;) {
+            band.along_a.push_back(from_a[i][j]);
+            --(band.along_a.back() ? i : j);
+        }
+        std::reverse(band.along_a.begin(), band.along_a.end());
+    }
+    return best;
+}
+
+/// Three steps of the walk that part it so that neither loop lies in one part alone; the parts as even as may be.
+std::array<int, 3> part_in_three(const Band& band) {
+    const int steps = static_cast<int>(band.along_a.size());
+    std::array<int, 3> best{};
+    int longest = steps + 1;
+    for (int p = 0; p < steps; ++p)
+        for (int q = p + 1; q < steps; ++q)
+            for (int r = q + 1; r < steps; ++r) {
+                const std::array<int, 4> cut{p, q, r, p + steps};
+                int with_a = 0, with_b = 0, most = 0;
+                for (int k = 0; k < 3; ++k) {
+                    bool a = false, b = false;
+                    for (int s = cut[k]; s < cut[k + 1]; ++s) (band.along_a[s % steps] ? a : b) = true;
+                    with_a += a;
+                    with_b += b;
+                    most = std::max(most, cut[k + 1] - cut[k]);
+                }
+                if (with_a > 1 && with_b > 1 && most < longest) longest = most, best = {p, q, r};
+            }
+    return best;
+}
+
+/// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross edges
+/// run over a ring of three extra vertices, each at the middle of a cross edge.
+void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
+    const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
+    Band band;
+    const bool direct = find_band(a, b, diagonal_cost, band) < forbidden;
+    if (!direct) find_band(a, b, distance2, band);
+    const int steps = n + m;
+    int i = 0, j = 0;
+    const auto at_a = [&] { return a[(band.start_a + i) % n]; };
+    const auto at_b = [&] { return b[(band.start_b - j + 2 * m) % m]; };
+    const std::array<int, 3> cut = direct ? std::array<int, 3>{-1, -1, -1} : part_in_three(band);
+    const int ring = edges + p.centre_count;
+    int place = 2;  // the last ring vertex before the first cut
+    for (int s = 0; s < steps; ++s) {
+        if (place < 2 ? s == cut[place + 1] : s == cut[0]) {
+            const int before = ring + place, after = ring + (place + 1) % 3;
+            place = (place + 1) % 3;
+            p.centre_edges[p.centre_count + place] = static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
+            add(p, after, before, at_a());
+            add(p, before, after, at_b());
+        }
+        const int from_a = at_a(), from_b = at_b();
+        ++(band.along_a[s] ? i : j);
+        if (band.along_a[s])
+            add(p, from_a, at_a(), direct ? from_b : ring + place);
+        else
+            add(p, at_b(), from_b, direct ? from_a : ring + place);
+    }
+    if (!direct) p.centre_count += 3;
+}
+
+/// Discs for all loops but the two that a tunnel joins (-1: none).
+Pattern make_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b) {
+    Pattern p;
+    for (int k = 0; k < static_cast<int>(loops.size()); ++k) {
+        for (const int e : loops[k]) p.edge_mask |= static_cast<std::uint16_t>(1 << e);
+        if (k != tunnel_a && k != tunnel_b) add_disc(p, loops[k]);
+    }
+    if (tunnel_a >= 0) add_tunnel(p, loops[tunnel_a], loops[tunnel_b]);
+    return p;
+}
+
+/// One sign case with its ambiguous faces settled: the loops, and a pattern for every pair of them that a tunnel
+/// may join.
+struct Entry {
+    std::array<std::int8_t, edges> loop_of_edge{};
+    int loop_count = 0;
+    Pattern separate;
+    std::array<std::array<int, 4>, 4> tunnel{};  // index into Tables::tunnels
+};
+
+struct Tables {
+    std::array<std::array<std::uint8_t, faces>, 256> ambiguous{};  // faces, in order
+    std::array<std::uint8_t, 256> ambiguous_count{};
+    std::array<int, 256> first{};  // entry of the case with no ambiguous face joined
+    std::vector<Entry> entries;
+    std::vector<Pattern> tunnels;
+
+    Tables() {
+        for (int c = 0; c < 256; ++c) {
+            for (int f = 0; f < faces; ++f)
+                if (is_ambiguous(c, f)) ambiguous[c][ambiguous_count[c]++] = static_cast<std::uint8_t>(f);
+            first[c] = static_cast<int>(entries.size());
+            for (int bits = 0; bits < 1 << ambiguous_count[c]; ++bits) entries.push_back(make_entry(c, bits));
+        }
+    }
+
+    Entry make_entry(int sign_case, int bits) {
+        int joined = 0;
+        for (int k = 0; k < ambiguous_count[sign_case]; ++k)
+            if (bits >> k & 1) joined |= 1 << ambiguous[sign_case][k];
+        const std::vector<Loop> loops = trace_loops(sign_case, joined);
+        Entry entry;
+        entry.loop_count = static_cast<int>(loops.size());
+        entry.loop_of_edge.fill(-1);
+        for (int k = 0; k < entry.loop_count; ++k)
+            for (const int e : loops[k]) entry.loop_of_edge[e] = static_cast<std::int8_t>(k);
+        entry.separate = make_pattern(loops, -1, -1);
+        for (int a = 0; a < entry.loop_count; ++a)
+            for (int b = a + 1; b < entry.loop_count; ++b) {
+                entry.tunnel[a][b] = static_cast<int>(tunnels.size());
+                tunnels.push_back(make_pattern(loops, a, b));
+            }
+        return entry;
+    }
+};
+
+const Tables& tables() {
+    static const Tables instance;
+    return instance;
+}
+
+/// The loops that belong to one connected piece of the level set, found by sweeping the slice z = t.
+class Sweep {
+ public:
+    Sweep(const Entry& entry, const std::array<double, corners>& d) : entry_(entry), d_(d) {
+        for (int k = 0; k < 4; ++k) group_[k] = k;
+    }
+
+    /// Follows the arcs of the slice's level set from t = 0 to t = 1 and joins the loops that they touch.
+    void run() {
+        for (int s = 0; s < 4; ++s) arc_[s] = entry_.loop_of_edge[bottom_edge[s]];
+        std::array<std::pair<double, int>, 4> events;
+        int count = 0;
+        for (int k = 0; k < 4; ++k) {
+            const double low = d_[column[k]], high = d_[column[k] + 4];
+            if ((low >= 0) != (high >= 0)) events[count++] = {low / (low - high), k};
+        }
+        for (int n = 1; n < count; ++n)  // at most four: an insertion sort
+            for (int k = n; k > 0 && events[k] < events[k - 1]; --k) std::swap(events[k], events[k - 1]);
+        double t = 0;
+        for (int n = 0; n < count; ++n) {
+            pass_saddles(t, events[n].first);
+            cross_column(events[n].second);
+            t = events[n].first;
+        }
+        pass_saddles(t, 1);
+        for (int s = 0; s < 4; ++s)
+            if (arc_[s] >= 0) join(arc_[s], entry_.loop_of_edge[bottom_edge[s] + top_offset[s]]);
+    }
+
+    int group(int loop) const { return group_[loop]; }
+
+ private:
+    // The slice's corners in cyclic order, the cell corners at their lower ends, and its sides between them.
+    static constexpr int column[4] = {0, 1, 3, 2};
+    static constexpr int bottom_edge[4] = {0, 5, 1, 4};  // x at y=0, y at x=1, x at y=1, y at x=0
+    static constexpr int top_offset[4] = {2, 2, 2, 2};   // the same edges at z=1
+
+    void join(int a, int b) {
+        if (a < 0 || b < 0) return;
+        const int from = group_[a], to = group_[b];
+        for (int& g : group_)
+            if (g == from) g = to;
+    }
+
+    /// Inside minus outside diagonal product of the slice at t: its saddle lies inside where this is ≥ 0.
+    double decider(double t) const {
+        double v[4];
+        for (int k = 0; k < 4; ++k) v[k] = d_[column[k]] + t * (d_[column[k] + 4] - d_[column[k]]);
+        return v[0] * v[2] - v[1] * v[3];
+    }
+
+    /// While all four sides are crossed two arcs run through the slice; where its saddle changes sign they meet.
+    void pass_saddles(double from, double to) {
+        for (const int a : arc_)
+            if (a < 0) return;
+        const double q0 = decider(0), q1 = decider(1), half = decider(0.5);
+        const double curve = 2 * (q0 + q1 - 2 * half), slope = q1 - q0 - curve;  // q(t) = q0 + slope t + curve t²
+        const double begin = from == 0 ? q0 : decider(from), end = to == 1 ? q1 : decider(to);
+        bool meet = (begin >= 0) != (end >= 0);
+        if (!meet && curve != 0) {
+            const double extreme = -slope / (2 * curve);
+            meet = extreme > from && extreme < to && (decider(extreme) >= 0) != (begin >= 0);
+        }
+        if (!meet) return;
+        for (int s = 1; s < 4; ++s) join(arc_[0], arc_[s]);
+    }
+
+    /// Corner k of the slice changes sign: an arc about it is born, dies, or moves to the other side.
+    void cross_column(int k) {
+        int& before = arc_[(k + 3) % 4];
+        int& after = arc_[k];
+        const int loop = entry_.loop_of_edge[8 + (column[k] & 3)];
+        join(before, loop);
+        join(after, loop);
+        const bool was_before = before >= 0, was_after = after >= 0;
+        before = was_before ? -1 : loop;
+        after = was_after ? -1 : loop;
+    }
+
+    const Entry& entry_;
+    const std::array<double, corners>& d_;
+    std::array<int, 4> group_;
+    std::array<int, 4> arc_{};  // a loop that the arc end on this side belongs to, -1 where there is none
+};
+
+}  // namespace
+
+bool depends_on_values(int sign_case) {
+    const Tables& t = tables();
+    return t.ambiguous_count[sign_case] > 0 || t.entries[t.first[sign_case]].loop_count > 1;
+}
+
+const Pattern& simple_pattern(int sign_case) {
+    const Tables& t = tables();
+    return t.entries[t.first[sign_case]].separate;
+}
+
+const Pattern& pattern(int sign_case, const std::array<double, corners>& d) {
+    const Tables& t = tables();
+    int bits = 0;
+    for (int k = 0; k < t.ambiguous_count[sign_case]; ++k) {
+        const auto q = face_corners(t.ambiguous[sign_case][k]);
+        const double even = d[q[0]] * d[q[2]], odd = d[q[1]] * d[q[3]];
+        const bool joined = inside(sign_case, q[0]) ? even >= odd : odd >= even;
+        bits |= joined << k;
+    }
+    const Entry& entry = t.entries[t.first[sign_case] + bits];
+    if (entry.loop_count < 2) return entry.separate;
+    Sweep sweep(entry, d);
+    sweep.run();
+    for (int a = 0; a < entry.loop_count; ++a)
+        for (int b = a + 1; b < entry.loop_count; ++b)
+            if (sweep.group(a) == sweep.group(b)) return t.tunnels[entry.tunnel[a][b]];
+    return entry.separate;
+}
+
+}  // namespace vdbgeo::cell

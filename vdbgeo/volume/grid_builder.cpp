@@ -346,13 +346,13 @@ DensityMap GridBuilder::finish(const Frame& frame) {
     std::vector<leaf::LowerNode*> lower_nodes;
     s.grid->tree().getNodes(lower_nodes);
     parallel_for(lower_nodes.size(), 1, [&](std::size_t n) {
-        for (auto it = lower_nodes[n]->beginValueOff(); it; ++it)
-            if (!band || *it != high) it.setValue(background);
+        for (auto it = lower_nodes[n]->beginValueAll(); it; ++it)  // beginValueOff would visit children too
+            if (it.isValueOff() && (!band || *it != high)) it.setValue(background);
     });
     std::vector<leaf::UpperNode*> upper_nodes;
     s.grid->tree().getNodes(upper_nodes);
     for (auto* node : upper_nodes)
-        for (auto it = node->beginValueOff(); it; ++it) it.setValue(background);
+        for (auto it = node->beginValueAll(); it; ++it) it.setValue(background);
 
     DensityMap map;
     map.grid = s.grid;

@@ -83,8 +83,11 @@ Counts Reader::header() {
         if (word.empty()) text_.fail("expected the counts of vertices and faces, found the end of the file");
     }
     const std::uint64_t vertices = count(word, "count of vertices");
-    const std::uint64_t faces = count(text_.word(), "count of faces");
-    return {vertices, faces};  // the count of edges, often 0 or absent, is not needed
+    word = text_.word();
+    if (word.empty()) text_.fail("count of faces is missing");
+    const std::uint64_t faces = count(word, "count of faces");
+    text_.skip_line();  // the count of edges, often 0 or absent, is not needed
+    return {vertices, faces};
 }
 
 void Reader::check_size(const Counts& counts) const {

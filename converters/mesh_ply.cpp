@@ -104,12 +104,13 @@ class BinaryBody {
     }
     [[noreturn]] void fail(const std::string& message) const {
         throw InvalidInput(fmt::format("{}: element {}, entry {}, byte {}: {}", file_,
-                                       in_quotes(element_->name), entry_, at_, message));
+                                       in_quotes(element_->name), entry_, value_at_, message));
     }
 
  private:
     template <class T>
     T take() {
+        value_at_ = at_;
         if (bytes_.size() - at_ < sizeof(T)) fail("the file ends within this entry");
         const T value = load<T>(bytes_.data() + at_, swap_);
         at_ += sizeof(T);
@@ -118,6 +119,7 @@ class BinaryBody {
 
     std::string_view bytes_;
     std::size_t at_;
+    std::size_t value_at_ = 0;  // the latest value
     bool swap_;
     const std::string& file_;
     const PlyElement* element_ = nullptr;

@@ -320,7 +320,7 @@ TEST(MeshFile, PlyBinaryOfBothByteOrdersAndEveryType) {
         file += binary(3, big);
         for (const std::uint16_t v : {2, 0, 1}) file += binary(v, big);
         const TriMesh mesh = read_text(file, "m.ply");
-        EXPECT_EQ(coordinates(mesh), (std::vector<float>{0.5, 0, 0, 1.5, -1, 1e-40f, 2.5, -2, 2e-40f}));
+        EXPECT_EQ(coordinates(mesh), (std::vector<float>{0.5, 0, 0, 1.5, -1, 1e-40f, 2.5, -2, 2 * 1e-40f}));
         EXPECT_EQ(corners(mesh), (std::vector<VertexId>{2, 0, 1}));
         const std::map<std::string, float> expected = {
             {"a", -100}, {"b", 200}, {"c", 60000}, {"d", -1e6}, {"e", 4e9}};

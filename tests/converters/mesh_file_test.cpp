@@ -6,6 +6,7 @@
 #include "vdbgeo/core/errors.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <thread>
 
 using namespace vdbgeo;
 using test::data_folder;
@@ -255,6 +257,20 @@ TEST(MeshFile, ContentGoesBeforeTheEnding) {
         std::string bytes = read_bytes(folder / "m.stl");
         write_bytes(folder / "n.stl", bytes.replace(0, word.size(), word));
         EXPECT_EQ(read_mesh(folder / "n.stl").triangles, mesh.triangles) << word;
+    }
+}
+
+TEST(MeshFile, PipesAreRead) {
+    const TriMesh mesh = awkward_mesh();
+    const TempFolder folder;
+    for (const std::string& ending : mesh_endings()) {
+        const std::filesystem::path file = folder / ("m" + ending), pipe = folder / ("pipe" + ending);
+        write_mesh(mesh, file);
+        ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+        std::thread writer([&] { write_bytes(pipe, read_bytes(file)); });
+        const TriMesh back = read_mesh(pipe);
+        writer.join();
+        EXPECT_EQ(corner_bits(back), corner_bits(mesh)) << ending;
     }
 }
 

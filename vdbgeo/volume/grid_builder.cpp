@@ -347,7 +347,7 @@ DensityMap GridBuilder::finish(const Frame& frame) {
     s.grid->tree().getNodes(lower_nodes);
     parallel_for(lower_nodes.size(), 1, [&](std::size_t n) {
         for (auto it = lower_nodes[n]->beginValueAll(); it; ++it)  // beginValueOff would visit children too
-            if (it.isValueOff() && (!band || *it != high)) it.setValue(background);
+            if (!it.isValueOn() && (!band || *it != high)) it.setValue(background);
     });
     std::vector<leaf::UpperNode*> upper_nodes;
     s.grid->tree().getNodes(upper_nodes);

@@ -118,14 +118,25 @@ TEST(PhantomField, CatenoidIsMinimal) {
 }
 
 TEST(Phantom, SamplesAreTheFieldAtTheFramesPositions) {
-    const Phantom phantom(options_for("torus", 24));
-    const std::vector<float> values = all_sections(phantom);
-    std::size_t i = 0;
-    for (int z = 0; z < 24; ++z)
-        for (int y = 0; y < 24; ++y)
-            for (int x = 0; x < 24; ++x, ++i)
-                ASSERT_NEAR(values[i], torus_field(phantom.frame().to_world(Vec3d(x, y, z)), 100, 40), 1e-4);
-    EXPECT_NEAR(phantom.frame().to_world(Vec3d(11.5, 11.5, 11.5)).norm(), 0, 1e-12);
+    const std::vector<std::pair<const char*, Field>> fields = {
+        {"sphere", [](const Vec3d& p) { return sphere_field(p, 100); }},
+        {"torus", [](const Vec3d& p) { return torus_field(p, 100, 40); }},
+        {"cylinder", [](const Vec3d& p) { return cylinder_field(p, 60, 160); }},
+        {"saddle", [](const Vec3d& p) { return saddle_field(p, 100); }},
+        {"catenoid", [](const Vec3d& p) { return catenoid_field(p, 40); }},
+        {"gyroid", [](const Vec3d& p) { return gyroid_field(p, 100); }}};
+    for (const auto& [kind, field] : fields) {
+        const Phantom phantom(options_for(kind, 24));
+        const std::vector<float> values = all_sections(phantom);
+        std::size_t i = 0;
+        for (int z = 0; z < 24; ++z)
+            for (int y = 0; y < 24; ++y)
+                for (int x = 0; x < 24; ++x, ++i) {
+                    const double exact = field(phantom.frame().to_world(Vec3d(x, y, z)));
+                    ASSERT_NEAR(values[i], exact, 1e-6 * (1 + std::abs(exact))) << kind;
+                }
+        EXPECT_NEAR(phantom.frame().to_world(Vec3d(11.5, 11.5, 11.5)).norm(), 0, 1e-12);
+    }
 }
 
 TEST(Phantom, CountedVolumeAndAreaTendToTheFormulas) {

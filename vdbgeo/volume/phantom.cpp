@@ -114,6 +114,38 @@ double voxel_size_of(const PhantomOptions& o, double extent) {
     return o.voxel_size ? *o.voxel_size : extent / (0.8 * (o.size - 1));
 }
 
+using Rows = std::function<void(int z, int y0, int y1, float* out)>;
+
+Rows shape_rows(const Shape& shape, int size, double voxel) {
+    return [shape, size, voxel](int z, int y0, int y1, float* out) {
+        const double middle = (size - 1) / 2.0;
+        for (int y = y0; y < y1; ++y)
+            for (int x = 0; x < size; ++x) {
+                const Vec3d p(x - middle, y - middle, z - middle);
+                *out++ = static_cast<float>(shape.field(voxel * p, shape));
+            }
+    };
+}
+
+/// gyroid_field from the sines and cosines along one axis, which are those along every axis: six library
+/// calls a sample would be most of the time.
+Rows gyroid_rows(double period, int size, double voxel) {
+    std::vector<double> sines, cosines;
+    for (int i = 0; i < size; ++i) {
+        const double angle = voxel * (i - (size - 1) / 2.0) * (2 * pi / period);
+        sines.push_back(std::sin(angle));
+        cosines.push_back(std::cos(angle));
+    }
+    return [sines, cosines](int z, int y0, int y1, float* out) {
+        const double sz = sines[static_cast<std::size_t>(z)], cz = cosines[static_cast<std::size_t>(z)];
+        for (int y = y0; y < y1; ++y) {
+            const double sy = sines[static_cast<std::size_t>(y)], cy = cosines[static_cast<std::size_t>(y)];
+            for (std::size_t x = 0; x < sines.size(); ++x)
+                *out++ = static_cast<float>(sines[x] * cy + sy * cz + sz * cosines[x]);
+        }
+    };
+}
+
 std::uint64_t mix(std::uint64_t h) {
     h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;
     h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
@@ -223,14 +255,7 @@ Phantom::Phantom(const PhantomOptions& options, const Progress& progress) : seed
     if (const Shape* standard = find_shape(options.kind)) {
         const Shape shape = shape_of(options, *standard);
         voxel = voxel_size_of(options, shape.extent(shape));
-        rows_ = [shape, size, voxel](int z, int y0, int y1, float* out) {
-            const double middle = (size - 1) / 2.0;
-            for (int y = y0; y < y1; ++y)
-                for (int x = 0; x < size; ++x) {
-                    const Vec3d p(x - middle, y - middle, z - middle);
-                    *out++ = static_cast<float>(shape.field(voxel * p, shape));
-                }
-        };
+        rows_ = shape.period ? gyroid_rows(*shape.period, size, voxel) : shape_rows(shape, size, voxel);
     } else {
         const std::vector<Part> parts = specimen_parts(options.kind);
         voxel = voxel_size_of(options, parts_extent(parts));

@@ -84,7 +84,7 @@ Parts microtubule() {
     Parts parts;
     for (int p = 0; p < protofilaments; ++p) {
         const double angle = -360.0 * p / protofilaments;
-        // whole dimers are left out below, so that both ends are as straight as dimers allow
+        // as many dimers further down as the helix has risen: the ends are as level as dimers allow
         const int first = -2 * static_cast<int>(std::lround(shift * p / (2 * repeat)));
         for (int m = first; m < first + monomers; ++m) {
             const bool beta = m % 2 != 0;

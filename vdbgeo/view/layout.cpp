@@ -4,6 +4,7 @@
 #include "vdbgeo/view/text.h"
 #include "vdbgeo/view/ticks.h"
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -134,7 +135,7 @@ Layout arrange(const std::vector<View>& views, const std::vector<ViewBox>& boxes
                const RenderOptions& options) {
     Layout layout{};
     layout.width = options.width;
-    const double em = layout.text = std::max(10.0, options.width / 64.0);
+    const double em = layout.text = std::max(11.0, options.width / 58.0);
     double across = 0, high = 0;
     for (const ViewBox& box : boxes) {
         across += box.high.x() - box.low.x();

@@ -4,6 +4,7 @@
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/view/layout.h"
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -170,13 +171,27 @@ class RayCaster {
         return Hit{query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
     }
 
-    bool blocked(const Vec3f& origin, const Vec3f& direction, float length) const {
-        RTCRay ray{};
-        set(ray, origin, direction, length);
+    static constexpr int packet = 8;
+
+    /// How many of `count` ≤ packet rays from one point meet something before their length.
+    int blocked(const Vec3f& origin, const Vec3f* directions, const float* lengths, int count) const {
+        RTCRay8 rays{};
+        alignas(32) int valid[packet];
+        for (int i = 0; i < packet; ++i) {
+            const int k = std::min(i, count - 1);
+            valid[i] = i < count ? -1 : 0;
+            rays.org_x[i] = origin.x(), rays.org_y[i] = origin.y(), rays.org_z[i] = origin.z();
+            rays.dir_x[i] = directions[k].x(), rays.dir_y[i] = directions[k].y(),
+            rays.dir_z[i] = directions[k].z();
+            rays.tfar[i] = lengths[k];
+            rays.mask[i] = ~0u;
+        }
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
-        rtcOccluded1(scene_, &context, &ray);
-        return ray.tfar < 0;
+        rtcOccluded8(valid, scene_, &context, &rays);
+        int result = 0;
+        for (int i = 0; i < count; ++i) result += rays.tfar[i] < 0;
+        return result;
     }
 
  private:
@@ -205,7 +220,7 @@ struct Sample {
 };
 
 /// The lights, in camera axes.
-const Vec3f key_light = Vec3f(-0.46f, 0.56f, 0.69f).normalized();
+const Vec3f key_light = Vec3f(-0.54f, 0.62f, 0.57f).normalized();
 const Vec3f fill_light = Vec3f(0.75f, -0.15f, 0.64f).normalized();
 constexpr float occlusion_reach = 0.5f;  // of the mesh's radius
 constexpr float ray_offset = 2e-5f;      // of the mesh's radius: some 100 units in the last place
@@ -263,6 +278,9 @@ float open_share(const Scene& scene, const Camera& camera, const Vec3f& origin, 
     const auto [tangent, bitangent] = tangents(normal);
     const float turn = static_cast<float>(order[(y & 3) * 4 + (x & 3)]) / 16;
     const float shift = static_cast<float>(order[((x + 1) & 3) * 4 + ((y + 2) & 3)]) / 16;
+    constexpr int packet = RayCaster::packet;
+    Vec3f directions[packet];
+    float lengths[packet];
     int blocked = 0;
     for (int i = 0; i < n; ++i) {
         const std::uint32_t ray = static_cast<std::uint32_t>(i);
@@ -274,8 +292,10 @@ float open_share(const Scene& scene, const Camera& camera, const Vec3f& origin, 
                   std::sqrt(std::max(0.0f, 1 - u)) * normal;
         const float below = d.dot(face_normal);
         if (below < 0) d -= 2 * below * face_normal;  // a smooth normal may lean over its flat face
-        const float length = occlusion_reach * (0.05f + 0.95f * noise(x, y, ray, 2));
-        blocked += scene.rays.blocked(origin, camera.axes * d, length);
+        directions[i % packet] = camera.axes * d;
+        lengths[i % packet] = occlusion_reach * (0.05f + 0.95f * noise(x, y, ray, 2));
+        if (i % packet == packet - 1 || i == n - 1)
+            blocked += scene.rays.blocked(origin, directions, lengths, i % packet + 1);
     }
     return 1 - static_cast<float>(blocked) / static_cast<float>(n);
 }
@@ -283,12 +303,22 @@ float open_share(const Scene& scene, const Camera& camera, const Vec3f& origin, 
 float key_share(const Scene& scene, const Camera& camera, const Vec3f& origin, const Vec3f& face_normal,
                 std::uint32_t x, std::uint32_t y) {
     if (!scene.options.shadows) return 1;
+    constexpr int n = 4;
     const auto [tangent, bitangent] = tangents(key_light);
-    const float radius = 0.22f * std::sqrt(noise(x, y, 0, 3)), angle = 6.2831853f * noise(x, y, 0, 4);
-    const Vec3f d =
-        (key_light + radius * (std::cos(angle) * tangent + std::sin(angle) * bitangent)).normalized();
-    if (d.dot(face_normal) <= 0) return 0;
-    return scene.rays.blocked(origin, camera.axes * d, 4.0f) ? 0 : 1;
+    Vec3f directions[n];
+    float lengths[n];
+    int above = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const float radius = 0.2f * std::sqrt((static_cast<float>(i) + noise(x, y, i, 3)) / n);
+        const float angle = 6.2831853f * (static_cast<float>(i) * 0.61803399f + noise(x, y, 0, 4));
+        const Vec3f d =
+            (key_light + radius * (std::cos(angle) * tangent + std::sin(angle) * bitangent)).normalized();
+        if (d.dot(face_normal) <= 0) continue;
+        directions[above] = camera.axes * d;
+        lengths[above++] = 4.0f;
+    }
+    if (above == 0) return 0;
+    return static_cast<float>(above - scene.rays.blocked(origin, directions, lengths, above)) / n;
 }
 
 Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
@@ -372,11 +402,11 @@ Vec3f shade(const Scene& scene, const Camera& camera, const Sample& s, float ope
     const float fill = std::max(0.0f, n.dot(fill_light));
     const float sky = (0.8f + 0.2f * n.y()) * std::pow(open, 1.3f);
     const Vec3f half = (key_light + Vec3f::UnitZ()).normalized();
-    const float gloss = 0.07f * std::pow(std::max(0.0f, n.dot(half)), 24.0f) * lit;
-    const Vec3f light = s.base * (0.60f * key + (0.12f * fill + 0.50f * sky) * (0.35f + 0.65f * open)) +
-                        Vec3f::Constant(gloss);
+    const float gloss = 0.10f * std::pow(std::max(0.0f, n.dot(half)), 28.0f) * lit;
+    const Vec3f light =
+        s.base * (0.95f * key + (0.16f * fill + 0.36f * sky) * (0.3f + 0.7f * open)) + Vec3f::Constant(gloss);
     const float depth = camera.near > camera.far ? (camera.near - s.depth) / (camera.near - camera.far) : 0;
-    const float fade = 0.22f * std::clamp(depth, 0.0f, 1.0f);
+    const float fade = 0.18f * std::clamp(depth, 0.0f, 1.0f);
     return light * (1 - fade) + linear(scene.options.background) * fade;
 }
 

@@ -27,12 +27,12 @@ struct RenderOptions {
     /// rounded to class numbers and the ranges have no meaning.
     std::optional<std::string> colormap;
 
-    int samples = 4;          ///< antialiasing: 1, 4, 9 or 16 primary rays a pixel
-    int occlusion_rays = 12;  ///< rays of ambient occlusion for each of them, 0 (none)…1024
-    bool shadows = true;      ///< soft shadow of the key light
+    int samples = 4;         ///< antialiasing: 1, 4, 9 or 16 primary rays a pixel
+    int occlusion_rays = 8;  ///< rays of ambient occlusion for each of them, 0 (none)…1024
+    bool shadows = true;     ///< soft shadow of the key light
     bool outline = true;  ///< dark lines where the surface hides a farther part of itself or the background
 
-    Vec3f surface{0.44f, 0.63f, 0.80f};  ///< sRGB, outside of the surface where no property colours it
+    Vec3f surface{0.47f, 0.67f, 0.85f};  ///< sRGB, outside of the surface where no property colours it
     Vec3f inside{0.86f, 0.62f, 0.36f};  ///< sRGB, inside: seen through a hole, or where faces are turned over
     Vec3f background{1, 1, 1};          ///< sRGB
 

@@ -126,7 +126,7 @@ constexpr Glyph glyphs[] = {
 };
 constexpr Glyph unknown = {U'\ufffd', 8, "0 0 0 14 8 14 8 0 0 0"};
 
-constexpr double em = 20, bearing = 1.45, pen = 1.55;
+constexpr double em = 20, bearing = 1.65, pen = 1.55;
 constexpr double superscript_size = 0.62, superscript_rise = 6.6;
 
 /// A character, and whether it is a small raised form of another one.

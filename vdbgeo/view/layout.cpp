@@ -14,7 +14,7 @@ namespace vdbgeo {
 namespace {
 
 // Heights of the strips around the views, in ems.
-constexpr double title_height = 2.2, caption_height = 3.2, footer_height = 4.0, margin = 1.0, gap = 1.6;
+constexpr double title_height = 2.2, caption_height = 3.2, footer_height = 4.4, margin = 1.0, gap = 1.6;
 
 View front() { return {"front", Vec3d::UnitX(), Vec3d::UnitZ(), -Vec3d::UnitY()}; }
 View side() { return {"side", Vec3d::UnitY(), Vec3d::UnitZ(), Vec3d::UnitX()}; }
@@ -80,7 +80,7 @@ std::string length_label(double A) {
 void draw_scale_bar(Image& image, const Layout& layout, double room, const Vec3f& colour) {
     const double em = layout.text;
     const double length = round_down(std::min(room, 0.25 * layout.width) / layout.pixels_per_A);
-    const double x = margin * em, y = layout.footer_top + 1.9 * em, thick = std::max(2.0, 0.22 * em);
+    const double x = margin * em, y = layout.footer_top + 2.35 * em, thick = std::max(2.0, 0.22 * em);
     const double wide = length * layout.pixels_per_A;
     fill_rectangle(image, x, y - thick / 2, x + wide, y + thick / 2, colour);
     draw_text(image, Vec2d(x + wide / 2, y + 1.3 * em), length_label(length), em, colour, TextAlign::centre);
@@ -94,7 +94,7 @@ void draw_gradient(Image& image, const ColourScale& scale, double x0, double x1,
 
 void draw_colour_bar(Image& image, const Layout& layout, const ColourScale& scale, double x0, double x1,
                      const Vec3f& colour) {
-    const double em = layout.text, y0 = layout.footer_top + 1.5 * em, y1 = y0 + 0.75 * em;
+    const double em = layout.text, y0 = layout.footer_top + 1.95 * em, y1 = y0 + 0.75 * em;
     const double line = std::max(1.0, 0.06 * em);
     x0 = std::round(x0), x1 = std::round(x1);
     draw_text(image, Vec2d((x0 + x1) / 2, y0 - 0.45 * em), scale.label, fitting(scale.label, em, x1 - x0),

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #ifdef VDBGEO_HAS_EMBREE
 #include <embree3/rtcore.h>
-#include <tbb/task_arena.h>
 #endif
 
 namespace vdbgeo {

@@ -59,10 +59,12 @@ bool can_render();
 /// origin matters beyond the precision of its float coordinates.
 ///
 /// Same mesh and options → same bytes, for any number of threads.
+///
 /// Errors: InvalidInput for bad options, an empty or damaged mesh, a mesh whose points all coincide, an
-/// unknown or non-scalar property, a build without embree; Cancelled by the progress. Cost: width · height ·
-/// samples · (1 + occlusion_rays) rays where the surface is; 40 bytes a vertex and 80 a face of memory
-/// besides the picture.
+/// unknown or non-scalar property, a build without embree; Cancelled by the progress.
+///
+/// Cost: width · height · samples · (5 + occlusion_rays) rays where the surface is; 40 bytes a vertex and 80
+/// a face of memory besides the picture.
 Image render(const TriMesh& mesh, const RenderOptions& options = {}, const Progress& progress = {});
 
 }  // namespace vdbgeo

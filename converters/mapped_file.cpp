@@ -1,7 +1,5 @@
 #include "converters/mapped_file.h"
 
-#include "vdbgeo/core/errors.h"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
@@ -10,6 +8,8 @@
 
 #include <cerrno>
 #include <cstring>
+
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 namespace {

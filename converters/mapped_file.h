@@ -1,12 +1,12 @@
 // A whole input file as bytes in memory.
 #pragma once
 
-#include "vdbgeo/core/types.h"
-
 #include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
+
+#include "vdbgeo/core/types.h"
 
 namespace vdbgeo {
 

@@ -1,12 +1,12 @@
 #include "converters/mesh_file.h"
 
-#include "converters/mesh_formats.h"
-#include "vdbgeo/core/errors.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+
+#include "converters/mesh_formats.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 namespace {

@@ -1,13 +1,13 @@
 // Triangle mesh files both ways: PLY, OBJ, OFF, STL.
 #pragma once
 
-#include "vdbgeo/core/progress.h"
-#include "vdbgeo/core/tri_mesh.h"
-
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/core/tri_mesh.h"
 
 namespace vdbgeo {
 

@@ -1,11 +1,6 @@
 // What the mesh formats share inside mesh_file.cpp and mesh_*.cpp.
 #pragma once
 
-#include "converters/mapped_file.h"
-#include "converters/mesh_file.h"
-#include "vdbgeo/core/atomic_file.h"
-#include "vdbgeo/core/parallel.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +10,11 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "converters/mapped_file.h"
+#include "converters/mesh_file.h"
+#include "vdbgeo/core/atomic_file.h"
+#include "vdbgeo/core/parallel.h"
 
 namespace vdbgeo::mesh_formats {
 

@@ -1,11 +1,11 @@
 // Wavefront OBJ: one statement a line, vertices counted from 1, or backwards from the latest one as -1.
-#include "converters/mesh_formats.h"
-#include "converters/text_cursor.h"
-#include "vdbgeo/core/errors.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
+
+#include "converters/mesh_formats.h"
+#include "converters/text_cursor.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::mesh_formats {
 namespace {

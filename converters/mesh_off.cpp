@@ -1,12 +1,12 @@
 // OFF, the text format of Geomview: a keyword, the counts, a line for each vertex and each face.
-#include "converters/mesh_formats.h"
-#include "converters/text_cursor.h"
-#include "vdbgeo/core/errors.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+
+#include "converters/mesh_formats.h"
+#include "converters/text_cursor.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::mesh_formats {
 namespace {

@@ -1,10 +1,6 @@
 // PLY: a text header that declares elements and their properties, then the values as text or binary.
 #include "converters/mesh_ply.h"
 
-#include "converters/mesh_formats.h"
-#include "converters/text_cursor.h"
-#include "vdbgeo/core/errors.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,6 +8,10 @@
 #include <optional>
 #include <set>
 #include <utility>
+
+#include "converters/mesh_formats.h"
+#include "converters/text_cursor.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::mesh_formats {
 namespace {

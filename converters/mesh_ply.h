@@ -1,13 +1,13 @@
 // The header of a PLY file.
 #pragma once
 
-#include "converters/mapped_file.h"
-
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "converters/mapped_file.h"
 
 namespace vdbgeo::mesh_formats {
 

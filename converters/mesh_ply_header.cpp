@@ -1,13 +1,13 @@
-#include "converters/mesh_ply.h"
-#include "converters/text_cursor.h"
-#include "vdbgeo/core/errors.h"
-#include "vdbgeo/core/tri_mesh.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 #include <utility>
+
+#include "converters/mesh_ply.h"
+#include "converters/text_cursor.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/tri_mesh.h"
 
 namespace vdbgeo::mesh_formats {
 namespace {

@@ -1,14 +1,14 @@
 // STL: facets with the coordinates of their corners, binary or as text.
-#include "converters/mesh_formats.h"
-#include "converters/text_cursor.h"
-#include "vdbgeo/core/errors.h"
-
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <cctype>
 #include <cmath>
 #include <limits>
+
+#include "converters/mesh_formats.h"
+#include "converters/text_cursor.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::mesh_formats {
 namespace {

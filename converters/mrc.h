@@ -25,21 +25,21 @@ struct MrcHeader {
     std::array<float, 3> angles{90, 90, 90};             ///< 14–16: cell angles α, β, γ, degrees
     std::int32_t mapc = 1, mapr = 2, maps = 3;           ///< 17–19: axis of columns, rows, sections
     float dmin = 0, dmax = -1, dmean = -2;               ///< 20–22
-    std::int32_t ispg = 1;                               ///< 23: space group; 0 image stack, 401+ volume stack
-    std::int32_t nsymbt = 0;                             ///< 24: bytes of the extended header
-    std::int32_t lskflg = 0;                             ///< 25 of CCP4 files before MRC2014: skew matrix present
-    std::array<float, 9> skwmat{};                       ///< 26–34 of such files
-    std::array<float, 3> skwtrn{};                       ///< 35–37 of such files: translation, Å
-    std::array<char, 4> exttyp{};                        ///< 27: type of the extended header
-    std::int32_t nversion = 0;                           ///< 28: 20140 or 20141 for MRC2014
-    std::int32_t imod_stamp = 0, imod_flags = 0;         ///< 39, 40: IMOD's stamp 1146047817 and flags
-    std::array<float, 3> origin{};                       ///< 50–52, Å
-    std::array<char, 4> map{};                           ///< 53: "MAP "
-    std::array<unsigned char, 4> machst{};               ///< 54: machine stamp
-    float rms = -1;                                      ///< 55
-    std::int32_t nlabl = 0;                              ///< 56
-    std::vector<std::string> labels;                     ///< 57–256: trimmed text, at most ten
-    bool swapped = false;                                ///< the file's byte order is not this machine's
+    std::int32_t ispg = 1;                        ///< 23: space group; 0 image stack, 401+ volume stack
+    std::int32_t nsymbt = 0;                      ///< 24: bytes of the extended header
+    std::int32_t lskflg = 0;                      ///< 25 of CCP4 files before MRC2014: skew matrix present
+    std::array<float, 9> skwmat{};                ///< 26–34 of such files
+    std::array<float, 3> skwtrn{};                ///< 35–37 of such files: translation, Å
+    std::array<char, 4> exttyp{};                 ///< 27: type of the extended header
+    std::int32_t nversion = 0;                    ///< 28: 20140 or 20141 for MRC2014
+    std::int32_t imod_stamp = 0, imod_flags = 0;  ///< 39, 40: IMOD's stamp 1146047817 and flags
+    std::array<float, 3> origin{};                ///< 50–52, Å
+    std::array<char, 4> map{};                    ///< 53: "MAP "
+    std::array<unsigned char, 4> machst{};        ///< 54: machine stamp
+    float rms = -1;                               ///< 55
+    std::int32_t nlabl = 0;                       ///< 56
+    std::vector<std::string> labels;              ///< 57–256: trimmed text, at most ten
+    bool swapped = false;                         ///< the file's byte order is not this machine's
 };
 
 /// Which header words give the world position of the first sample.
@@ -58,7 +58,7 @@ struct MrcReadOptions {
     OriginRule origin = OriginRule::automatic;  ///< which words give the origin
     Vec3d origin_A = Vec3d::Zero();             ///< for OriginRule::given, Å
     std::optional<Vec3d> voxel_size_A;          ///< overrides the header's cell; each positive, Å
-    int volume = 0;                             ///< which volume of a stack of volumes (ISPG 401 and up), from 0
+    int volume = 0;  ///< which volume of a stack of volumes (ISPG 401 and up), from 0
 
     void check() const;
 };
@@ -66,10 +66,10 @@ struct MrcReadOptions {
 /// Reads the sections of a map file in file order, as float, without ever holding more than is asked for.
 ///
 /// Modes 0 (int8, or uint8), 1 (int16), 2 (float32), 6 (uint16), 12 (float16), 101 (4-bit); both byte orders;
-/// every axis permutation; gzip, bzip2 and zstd by content. Sizes are 64-bit and checked against the length of
-/// the file before anything is allocated. A file that is damaged, truncated, of another format or of a mode not
-/// supported is refused with InvalidInput: one line with the word, what was expected and what was found; a file
-/// that cannot be opened or read is an IoError.
+/// every axis permutation; gzip, bzip2 and zstd by content. Sizes are 64-bit and checked against the length
+/// of the file before anything is allocated. A file that is damaged, truncated, of another format or of a
+/// mode not supported is refused with InvalidInput: one line with the word, what was expected and what was
+/// found; a file that cannot be opened or read is an IoError.
 class MrcReader {
  public:
     explicit MrcReader(const std::filesystem::path& path, const MrcReadOptions& options = {});
@@ -112,8 +112,8 @@ struct MrcWriteOptions {
 /// axes the order of the file that the map came from (metadata mrc_axes), so that an unsparsified map gives
 /// back the same data bytes. The name's ending .gz, .bz2 or .zst is not honoured: the file is plain.
 /// A bounded frame gives the box, else the box is that of the active voxels and the origin moves with it.
-/// Cell, ORIGIN, NSTART, labels, machine stamp and recomputed statistics are set. In integer modes values must
-/// be whole numbers in range: InvalidInput otherwise (nothing is scaled silently).
+/// Cell, ORIGIN, NSTART, labels, machine stamp and recomputed statistics are set. In integer modes values
+/// must be whole numbers in range: InvalidInput otherwise (nothing is scaled silently).
 void write_mrc(const DensityMap& map, const std::filesystem::path& path, const MrcWriteOptions& options = {},
                const Progress& progress = {});
 

@@ -1,13 +1,13 @@
 #include "converters/text_cursor.h"
 
-#include "vdbgeo/core/errors.h"
-
 #include <fmt/format.h>
 #include <locale.h>
 #include <stdlib.h>
 
 #include <charconv>
 #include <utility>
+
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 namespace {

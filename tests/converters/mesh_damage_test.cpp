@@ -1,14 +1,14 @@
 // Damaged mesh files are refused with one line that names the place.
-#include "converters/mesh_file.h"
-#include "converters/mesh_formats.h"
-#include "tests/support/temp_folder.h"
-#include "vdbgeo/core/errors.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <map>
 #include <random>
+
+#include "converters/mesh_file.h"
+#include "converters/mesh_formats.h"
+#include "tests/support/temp_folder.h"
+#include "vdbgeo/core/errors.h"
 
 using namespace vdbgeo;
 using test::read_bytes;

@@ -1,10 +1,6 @@
 // Meshes come back from each format as they went in, and every variant of a format is understood.
 #include "converters/mesh_file.h"
 
-#include "tests/support/data.h"
-#include "tests/support/temp_folder.h"
-#include "vdbgeo/core/errors.h"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <tbb/global_control.h>
@@ -17,6 +13,10 @@
 #include <map>
 #include <random>
 #include <thread>
+
+#include "tests/support/data.h"
+#include "tests/support/temp_folder.h"
+#include "vdbgeo/core/errors.h"
 
 using namespace vdbgeo;
 using test::data_folder;

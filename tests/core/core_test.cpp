@@ -30,7 +30,8 @@ TEST(Progress, FalseCancels) {
 
 TEST(Parallel, SumsHaveTheSameBitsForAnyThreadCount) {
     const auto sum = [](int threads) {
-        tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+        tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
         return fixed_order_reduce(
             1000003, 1000, 0.0,
             [](std::size_t begin, std::size_t end) {

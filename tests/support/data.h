@@ -1,5 +1,5 @@
-// Real files for the tests. They are not part of the project: VDBGEO_DATA names the folder that holds them, and
-// a test that needs one is skipped, saying so, where it is absent.
+// Real files for the tests. They are not part of the project: VDBGEO_DATA names the folder that holds them,
+// and a test that needs one is skipped, saying so, where it is absent.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,8 +23,8 @@ inline bool have_data(const std::string& name) {
 }  // namespace vdbgeo::test
 
 /// Skips the running test where the real file `name` is absent.
-#define VDBGEO_NEEDS_DATA(name)                                                                      \
-    do {                                                                                             \
-        if (!vdbgeo::test::have_data(name))                                                          \
-            GTEST_SKIP() << "needs the real file " << (name) << " in the folder VDBGEO_DATA";        \
+#define VDBGEO_NEEDS_DATA(name)                                                               \
+    do {                                                                                      \
+        if (!vdbgeo::test::have_data(name))                                                   \
+            GTEST_SKIP() << "needs the real file " << (name) << " in the folder VDBGEO_DATA"; \
     } while (false)

@@ -11,8 +11,8 @@
 namespace vdbgeo::test {
 
 /// A dense map of the given size from values in x-fastest order.
-inline DensityMap map_from_values(const Vec3i& size, const std::vector<float>& values, const Frame& frame = {},
-                                  const SparsifyOptions& options = {}) {
+inline DensityMap map_from_values(const Vec3i& size, const std::vector<float>& values,
+                                  const Frame& frame = {}, const SparsifyOptions& options = {}) {
     GridBuilder builder(size, {0, 1, 2}, options);
     builder.add_sections(values.data(), size.z());
     return builder.finish(frame);
@@ -20,7 +20,8 @@ inline DensityMap map_from_values(const Vec3i& size, const std::vector<float>& v
 
 /// A dense map that samples f(x, y, z) at the world positions of the frame.
 inline DensityMap map_from_function(const Vec3i& size, const Frame& frame,
-                                    const std::function<double(const Vec3d&)>& f, const SparsifyOptions& options = {}) {
+                                    const std::function<double(const Vec3d&)>& f,
+                                    const SparsifyOptions& options = {}) {
     std::vector<float> values;
     values.reserve(static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) *
                    static_cast<std::size_t>(size.z()));

@@ -1,5 +1,5 @@
-// Marching cubes: analytic shapes, manifoldness and determinism. The topology of ambiguous cells has an oracle of its
-// own in topology_test.cpp.
+// Marching cubes: analytic shapes, manifoldness and determinism. The topology of ambiguous cells has an
+// oracle of its own in topology_test.cpp.
 #include "vdbgeo/surface/marching_cubes.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,8 @@ TEST(MarchingCubes, AreaAndVolumeConvergeAtSecondOrder) {
 
 TEST(MarchingCubes, ATorusHasOneHandle) {
     const auto torus = [](const Vec3d& p) { return 0.35 - std::hypot(std::hypot(p.x(), p.y()) - 1, p.z()); };
-    const MeshMeasures m = measure_mesh(extract(map_from_function(Vec3i(60, 60, 60), centred_frame(60, 0.05), torus)));
+    const MeshMeasures m =
+        measure_mesh(extract(map_from_function(Vec3i(60, 60, 60), centred_frame(60, 0.05), torus)));
     EXPECT_TRUE(m.closed && m.manifold && m.oriented);
     EXPECT_EQ(m.genus, 1);
     EXPECT_NEAR(m.area_A2, 4 * M_PI * M_PI * 0.35, 0.05);
@@ -80,7 +81,8 @@ TEST(MarchingCubes, NoiseGivesAManifoldThatIsOpenAtTheBorderOnly) {
     std::vector<float> values = noise(n * n * n, 1);
     for (int i = 0; i < n * n * n; ++i) {
         const int x = i % n, y = i / n % n, z = i / n / n;
-        if (std::min({x, y, z}) == 0 || std::max({x, y, z}) == n - 1) values[static_cast<std::size_t>(i)] = -1;
+        if (std::min({x, y, z}) == 0 || std::max({x, y, z}) == n - 1)
+            values[static_cast<std::size_t>(i)] = -1;
     }
     const MeshMeasures closed = measure_mesh(extract(map_from_values(Vec3i(n, n, n), values)));
     EXPECT_TRUE(closed.closed && closed.manifold && closed.oriented);
@@ -109,7 +111,9 @@ TEST(MarchingCubes, ASparseGridGivesTheDenseGridsSurface) {
 }
 
 TEST(MarchingCubes, ShiftingTheFieldAcrossLeavesShiftsTheSurface) {
-    const auto blob = [](const Vec3d& p) { return 5.3 - (p - Vec3d(9.2, 8.1, 10.7)).norm() + 0.4 * std::sin(p.x() * p.y()); };
+    const auto blob = [](const Vec3d& p) {
+        return 5.3 - (p - Vec3d(9.2, 8.1, 10.7)).norm() + 0.4 * std::sin(p.x() * p.y());
+    };
     const MeshMeasures reference = measure_mesh(extract(map_from_function(Vec3i(32, 32, 32), {}, blob)));
     for (int s = 1; s < 8; ++s) {
         const Vec3d shift(s, s, s);
@@ -124,9 +128,9 @@ TEST(MarchingCubes, ShiftingTheFieldAcrossLeavesShiftsTheSurface) {
 TEST(MarchingCubes, AnUnboundedGridIsClosedAcrossMissingLeavesAndTiles) {
     DensityMap map;
     map.grid = openvdb::FloatGrid::create(0.0f);
-    map.grid->tree().addTile(1, openvdb::Coord(-8, 0, 8), 1.0f, true);    // 8³
-    map.grid->tree().addTile(2, openvdb::Coord(128, 0, 0), 1.0f, true);   // 128³
-    map.grid->tree().setValue(openvdb::Coord(-100, -100, -100), 1.0f);    // one voxel at a leaf's corner
+    map.grid->tree().addTile(1, openvdb::Coord(-8, 0, 8), 1.0f, true);   // 8³
+    map.grid->tree().addTile(2, openvdb::Coord(128, 0, 0), 1.0f, true);  // 128³
+    map.grid->tree().setValue(openvdb::Coord(-100, -100, -100), 1.0f);   // one voxel at a leaf's corner
     map.grid->tree().setValue(openvdb::Coord(-200, -200, -193), 1.0f);
     const MeshMeasures m = measure_mesh(extract(map, 0.5));
     EXPECT_TRUE(m.closed && m.manifold && m.oriented);

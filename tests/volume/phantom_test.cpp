@@ -1,7 +1,5 @@
 #include "vdbgeo/volume/phantom.h"
 
-#include "vdbgeo/core/errors.h"
-
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "vdbgeo/core/errors.h"
 
 using namespace vdbgeo;
 

@@ -1,13 +1,13 @@
 #include "vdbgeo/volume/specimen.h"
 
-#include "vdbgeo/core/errors.h"
-#include "vdbgeo/volume/phantom.h"
-
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/phantom.h"
 
 using namespace vdbgeo;
 

@@ -50,14 +50,15 @@ class AtomicFile::Sink : public std::streambuf {
     fs::path target_, temporary_;
     std::string name_;
     int fd_ = -1;
-    bool direct_ = false;     // not a regular file: no temporary, no rename
+    bool direct_ = false;  // not a regular file: no temporary, no rename
     bool committed_ = false;
-    std::int64_t offset_ = 0;      // file offset of the buffer's start
+    std::int64_t offset_ = 0;        // file offset of the buffer's start
     std::int64_t written_back_ = 0;  // up to here the kernel was asked to start writing
     std::vector<char> buffer_;
 };
 
-AtomicFile::Sink::Sink(const fs::path& target) : target_(target), name_(target.string()), buffer_(buffer_bytes) {
+AtomicFile::Sink::Sink(const fs::path& target)
+    : target_(target), name_(target.string()), buffer_(buffer_bytes) {
     if (name_ == "-") {
         name_ = "standard output";
         fd_ = ::dup(STDOUT_FILENO);
@@ -65,7 +66,8 @@ AtomicFile::Sink::Sink(const fs::path& target) : target_(target), name_(target.s
     } else {
         std::error_code ignored;
         // A link is followed: its target is replaced, the link stays.
-        if (fs::is_symlink(target_, ignored) && fs::exists(target_, ignored)) target_ = fs::canonical(target_);
+        if (fs::is_symlink(target_, ignored) && fs::exists(target_, ignored))
+            target_ = fs::canonical(target_);
         struct stat status {};
         if (::stat(target_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
             if (S_ISDIR(status.st_mode)) throw IoError(fmt::format("{}: is a directory", name_));
@@ -155,7 +157,9 @@ AtomicFile::Sink::pos_type AtomicFile::Sink::seekoff(off_type offset, std::ios_b
     if (from == std::ios_base::cur && offset == 0) return pos_type(offset_ + (pptr() - pbase()));
     if (direct_) return pos_type(off_type(-1));
     flush_buffer();
-    const int whence = from == std::ios_base::beg ? SEEK_SET : from == std::ios_base::cur ? SEEK_CUR : SEEK_END;
+    const int whence = from == std::ios_base::beg   ? SEEK_SET
+                       : from == std::ios_base::cur ? SEEK_CUR
+                                                    : SEEK_END;
     const off_t reached = ::lseek(fd_, offset, whence);
     if (reached < 0) fail("seeking failed", errno);
     offset_ = reached;
@@ -174,7 +178,8 @@ void AtomicFile::Sink::commit() {
         const std::string self = fmt::format("/proc/self/fd/{}", fd_);
         for (int attempt = 0; temporary_.empty(); ++attempt) {
             fs::path candidate = target_;
-            candidate.replace_filename(fmt::format(".{}.{}.{}", target_.filename().string(), ::getpid(), attempt));
+            candidate.replace_filename(
+                fmt::format(".{}.{}.{}", target_.filename().string(), ::getpid(), attempt));
             if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, candidate.c_str(), AT_SYMLINK_FOLLOW) == 0)
                 temporary_ = candidate;
             else if (errno != EEXIST || attempt > 100)

@@ -19,8 +19,8 @@ void check_sizes(const std::vector<MeshProperty>& properties, std::size_t elemen
     for (const MeshProperty& p : properties) {
         const std::size_t expected = elements * static_cast<std::size_t>(p.components);
         if (p.components < 1 || p.values.size() != expected)
-            throw InvalidInput(fmt::format("{}: property '{}' has {} values where {} are needed", what, p.name,
-                                           p.values.size(), expected));
+            throw InvalidInput(fmt::format("{}: property '{}' has {} values where {} are needed", what,
+                                           p.name, p.values.size(), expected));
     }
 }
 
@@ -39,11 +39,13 @@ void check(const TriMesh& mesh, const std::string& what) {
         throw InvalidInput(fmt::format("{}: {} vertices, more than 2^32-1", what, mesh.points.size()));
     for (std::size_t i = 0; i < mesh.points.size(); ++i)
         if (!mesh.points[i].allFinite())
-            throw InvalidInput(fmt::format("{}: vertex {} has a coordinate that is not a finite number", what, i));
+            throw InvalidInput(
+                fmt::format("{}: vertex {} has a coordinate that is not a finite number", what, i));
     for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
         for (const VertexId v : mesh.triangles[f])
             if (v >= mesh.points.size())
-                throw InvalidInput(fmt::format("{}: face {} names vertex {} of {}", what, f, v, mesh.points.size()));
+                throw InvalidInput(
+                    fmt::format("{}: face {} names vertex {} of {}", what, f, v, mesh.points.size()));
     check_sizes(mesh.vertex_properties, mesh.points.size(), what);
     check_sizes(mesh.face_properties, mesh.triangles.size(), what);
 }

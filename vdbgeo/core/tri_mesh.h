@@ -22,7 +22,8 @@ struct MeshProperty {
     std::vector<float> values;  ///< components × number of vertices (or faces), element after element
 };
 
-/// Triangles over shared points, in Å. Counter-clockwise seen from outside: normals point from dense to empty.
+/// Triangles over shared points, in Å. Counter-clockwise seen from outside: normals point from dense to
+/// empty.
 struct TriMesh {
     static constexpr std::uint64_t max_vertices = 0xFFFFFFFFull;
 

@@ -16,7 +16,9 @@ constexpr double degrees = 180 / 3.14159265358979323846;
 /// Disjoint sets by path halving.
 class DisjointSets {
  public:
-    explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    explicit DisjointSets(std::size_t count) : parent_(count) {
+        std::iota(parent_.begin(), parent_.end(), 0u);
+    }
     std::uint64_t find(std::uint64_t i) {
         while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
         return i;
@@ -86,7 +88,8 @@ Sums sum_faces(const TriMesh& mesh) {
             Sums s;
             for (std::size_t f = begin; f < end; ++f) {
                 std::array<Vec3d, 3> p;
-                for (std::size_t k = 0; k < 3; ++k) p[k] = mesh.points[mesh.triangles[f][k]].cast<double>() - centre;
+                for (std::size_t k = 0; k < 3; ++k)
+                    p[k] = mesh.points[mesh.triangles[f][k]].cast<double>() - centre;
                 add_face(s, p);
             }
             return s;
@@ -130,8 +133,11 @@ void visit_edges(const TriMesh& mesh, MeshMeasures& m, DisjointSets& fans) {
         const std::size_t faces = end - begin;
         m.boundary_edges += faces == 1;
         m.non_manifold_edges += faces > 2;
-        const auto low = static_cast<VertexId>(sides[begin].edge >> 32), high = static_cast<VertexId>(sides[begin].edge);
-        const auto starts_low = [&](std::size_t i) { return mesh.triangles[sides[i].corner / 3][sides[i].corner % 3] == low; };
+        const auto low = static_cast<VertexId>(sides[begin].edge >> 32),
+                   high = static_cast<VertexId>(sides[begin].edge);
+        const auto starts_low = [&](std::size_t i) {
+            return mesh.triangles[sides[i].corner / 3][sides[i].corner % 3] == low;
+        };
         if (faces == 2 && starts_low(begin) == starts_low(begin + 1)) ++m.misoriented_edges;
         for (std::size_t i = begin + 1; i < end; ++i)
             for (const VertexId v : {low, high})

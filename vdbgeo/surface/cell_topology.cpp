@@ -28,7 +28,8 @@ bool inside(int sign_case, int corner) { return sign_case >> corner & 1; }
 
 bool is_ambiguous(int sign_case, int face) {
     const auto q = face_corners(face);
-    return inside(sign_case, q[0]) == inside(sign_case, q[2]) && inside(sign_case, q[1]) == inside(sign_case, q[3]) &&
+    return inside(sign_case, q[0]) == inside(sign_case, q[2]) &&
+           inside(sign_case, q[1]) == inside(sign_case, q[3]) &&
            inside(sign_case, q[0]) != inside(sign_case, q[1]);
 }
 
@@ -43,8 +44,8 @@ bool share_a_face(int a, int b) {
     return false;
 }
 
-/// The contours of all faces, chained into loops. Bit f of `joined`: on the ambiguous face f the inside corners
-/// are connected across it. Each loop runs counter-clockwise seen from the empty side.
+/// The contours of all faces, chained into loops. Bit f of `joined`: on the ambiguous face f the inside
+/// corners are connected across it. Each loop runs counter-clockwise seen from the empty side.
 std::vector<Loop> trace_loops(int sign_case, int joined) {
     std::array<int, edges> next;
     next.fill(-1);
@@ -55,7 +56,8 @@ std::vector<Loop> trace_loops(int sign_case, int joined) {
             if (inside(sign_case, q[(k + 3) % 4]) || !inside(sign_case, q[k])) continue;
             int last = k;
             while (inside(sign_case, q[(last + 1) % 4])) last = (last + 1) % 4;
-            const int enter = edge_between(q[(k + 3) % 4], q[k]), leave = edge_between(q[last], q[(last + 1) % 4]);
+            const int enter = edge_between(q[(k + 3) % 4], q[k]),
+                      leave = edge_between(q[last], q[(last + 1) % 4]);
             // Joined: the contour cuts off the empty corner before this run instead of the dense one.
             next[enter] = swap ? edge_between(q[(k + 2) % 4], q[(k + 3) % 4]) : leave;
         }
@@ -78,14 +80,16 @@ std::vector<Loop> trace_loops(int sign_case, int joined) {
 int distance2(int a, int b) {
     int sum = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        const auto place = [&](int e) { return (lower_corner(e) >> axis & 1) + (upper_corner(e) >> axis & 1); };
+        const auto place = [&](int e) {
+            return (lower_corner(e) >> axis & 1) + (upper_corner(e) >> axis & 1);
+        };
         sum += (place(a) - place(b)) * (place(a) - place(b));
     }
     return sum;
 }
 
-// A diagonal inside a face of the cell could also be made by the neighbour cell, and four triangles would then
-// meet in it. So no edge between triangles may join two crossings of one face.
+// A diagonal inside a face of the cell could also be made by the neighbour cell, and four triangles would
+// then meet in it. So no edge between triangles may join two crossings of one face.
 constexpr int forbidden = 1 << 20;
 int diagonal_cost(int a, int b) { return share_a_face(a, b) ? forbidden : distance2(a, b); }
 
@@ -133,15 +137,15 @@ void add_disc(Pattern& p, const Loop& loop) {
     }
 }
 
-/// A walk once around loop a forwards and once around loop b backwards, every step one triangle of the band between
-/// them: true for a step along a. It begins at the cross edge a[start_a] – b[start_b].
+/// A walk once around loop a forwards and once around loop b backwards, every step one triangle of the band
+/// between them: true for a step along a. It begins at the cross edge a[start_a] – b[start_b].
 struct Band {
     std::vector<bool> along_a;
     int start_a = 0, start_b = 0;
 };
 
-/// The walk with the shortest cross edges, by dynamic programming over the lattice of cross edges for every start.
-/// Returns its cost, `forbidden` or more where no walk does without a forbidden cross edge.
+/// The walk with the shortest cross edges, by dynamic programming over the lattice of cross edges for every
+/// start. Returns its cost, `forbidden` or more where no walk does without a forbidden cross edge.
 template <class Cost>
 int find_band(const Loop& a, const Loop& b, const Cost& edge_cost, Band& band) {
     const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
@@ -174,7 +178,8 @@ int find_band(const Loop& a, const Loop& b, const Cost& edge_cost, Band& band) {
     return best;
 }
 
-/// Three steps of the walk that part it so that neither loop lies in one part alone; the parts as even as may be.
+/// Three steps of the walk that part it so that neither loop lies in one part alone; the parts as even as may
+/// be.
 std::array<int, 3> part_in_three(const Band& band) {
     const int steps = static_cast<int>(band.along_a.size());
     std::array<int, 3> best{};
@@ -196,8 +201,8 @@ std::array<int, 3> part_in_three(const Band& band) {
     return best;
 }
 
-/// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross edges
-/// run over a ring of three extra vertices, each at the middle of a cross edge.
+/// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross
+/// edges run over a ring of three extra vertices, each at the middle of a cross edge.
 void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
     const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
     Band band;
@@ -239,8 +244,8 @@ Pattern make_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b)
     return p;
 }
 
-/// One sign case with its ambiguous faces settled: the loops, and a pattern for every pair of them that a tunnel
-/// may join.
+/// One sign case with its ambiguous faces settled: the loops, and a pattern for every pair of them that a
+/// tunnel may join.
 struct Entry {
     std::array<std::int8_t, edges> loop_of_edge{};
     int loop_count = 0;
@@ -340,12 +345,14 @@ class Sweep {
         return v[0] * v[2] - v[1] * v[3];
     }
 
-    /// While all four sides are crossed two arcs run through the slice; where its saddle changes sign they meet.
+    /// While all four sides are crossed two arcs run through the slice; where its saddle changes sign they
+    /// meet.
     void pass_saddles(double from, double to) {
         for (const int a : arc_)
             if (a < 0) return;
         const double q0 = decider(0), q1 = decider(1), half = decider(0.5);
-        const double curve = 2 * (q0 + q1 - 2 * half), slope = q1 - q0 - curve;  // q(t) = q0 + slope t + curve t²
+        const double curve = 2 * (q0 + q1 - 2 * half),
+                     slope = q1 - q0 - curve;  // q(t) = q0 + slope t + curve t²
         const double begin = from == 0 ? q0 : decider(from), end = to == 1 ? q1 : decider(to);
         bool meet = (begin >= 0) != (end >= 0);
         if (!meet && curve != 0) {

@@ -21,8 +21,8 @@ constexpr int upper_corner(int e) { return lower_corner(e) + (1 << (e / 4)); }
 /// Most triangles and extra vertices that a cell can need.
 constexpr int max_triangles = 24, max_centres = 4;
 
-/// How to triangulate a cell: triples of vertices, 0…11 the crossing of that edge, 12 + k the k-th extra vertex
-/// inside the cell, which lies at the mean of the crossings in `centre_edges[k]` (a bit per edge).
+/// How to triangulate a cell: triples of vertices, 0…11 the crossing of that edge, 12 + k the k-th extra
+/// vertex inside the cell, which lies at the mean of the crossings in `centre_edges[k]` (a bit per edge).
 struct Pattern {
     std::uint8_t triangle_count = 0, centre_count = 0;
     std::uint16_t edge_mask = 0;
@@ -30,16 +30,17 @@ struct Pattern {
     std::array<std::array<std::uint8_t, 3>, max_triangles> triangles{};
 };
 
-/// The patterns of the 256 sign cases (bit c set: corner c is inside). For a case without an ambiguous face and
-/// with a single loop the pattern depends on the case alone.
+/// The patterns of the 256 sign cases (bit c set: corner c is inside). For a case without an ambiguous face
+/// and with a single loop the pattern depends on the case alone.
 bool depends_on_values(int sign_case);
 const Pattern& simple_pattern(int sign_case);
 
-/// The pattern with the topology of the trilinear interpolant, for any case. `d` are the corner values minus the
-/// isovalue; corners with d ≥ 0 are inside. Ambiguous faces are told apart by the asymptotic decider (Nielson &
-/// Hamann 1991), which depends on the four values of the face alone, so that the two cells at a face agree; the
-/// inside by following the level set of the slices z = t from t = 0 to 1, whose only events are the crossings of
-/// the z edges and the zeros of a quadratic: exact, in place of the case-by-case tests of Chernyaev (1995).
+/// The pattern with the topology of the trilinear interpolant, for any case. `d` are the corner values minus
+/// the isovalue; corners with d ≥ 0 are inside. Ambiguous faces are told apart by the asymptotic decider
+/// (Nielson & Hamann 1991), which depends on the four values of the face alone, so that the two cells at a
+/// face agree; the inside by following the level set of the slices z = t from t = 0 to 1, whose only events
+/// are the crossings of the z edges and the zeros of a quadratic: exact, in place of the case-by-case tests
+/// of Chernyaev (1995).
 const Pattern& pattern(int sign_case, const std::array<double, corners>& d);
 
 }  // namespace vdbgeo::cell

@@ -35,7 +35,8 @@ std::uint8_t leaf_state(const float* v, float isovalue) {
     const __m128 iso = _mm_set1_ps(isovalue);
     __m128 all = _mm_castsi128_ps(_mm_set1_epi32(-1)), any = _mm_setzero_ps();
     for (int i = 0; i < leaf::size; i += 8) {
-        const __m128 a = _mm_cmpge_ps(_mm_loadu_ps(v + i), iso), b = _mm_cmpge_ps(_mm_loadu_ps(v + i + 4), iso);
+        const __m128 a = _mm_cmpge_ps(_mm_loadu_ps(v + i), iso),
+                     b = _mm_cmpge_ps(_mm_loadu_ps(v + i + 4), iso);
         all = _mm_and_ps(all, _mm_and_ps(a, b));
         any = _mm_or_ps(any, _mm_or_ps(a, b));
     }
@@ -56,7 +57,8 @@ CrossingBlocks::CrossingBlocks(const openvdb::FloatTree& tree, const Frame& fram
     std::size_t total = 0;
     for (const auto& list : found) total += list.size();
     if (total > 0x7FFFFFFF)
-        throw InvalidInput(fmt::format("the surface runs through {} blocks of 8³ voxels, more than 2^31", total));
+        throw InvalidInput(
+            fmt::format("the surface runs through {} blocks of 8³ voxels, more than 2^31", total));
     blocks_.reserve(total);
     for (const auto& list : found)
         for (const Block& block : list) {
@@ -88,7 +90,8 @@ void CrossingBlocks::collect_nodes() {
             if (sign_state(*it) != outside) add_nodes(it.getCoord());
     for (auto it = tree_.root().cbeginValueAll(); it; ++it)
         if (sign_state(*it) != outside)
-            throw InvalidInput("a constant block of 4096³ voxels lies across the isovalue from the background");
+            throw InvalidInput(
+                "a constant block of 4096³ voxels lies across the isovalue from the background");
 
     std::vector<Coord> origins;
     origins.reserve(node_at_.size());
@@ -131,7 +134,8 @@ void CrossingBlocks::find_blocks(std::size_t n, std::vector<Block>& out) const {
     constexpr int m = node_dim + 1;
     std::array<std::uint8_t, m * m * m> state;  // of this node's blocks and of the next layer
     const auto outside = [&](const Coord& c) {
-        return frame_.bounded() && (c.x() >= frame_.size.x() || c.y() >= frame_.size.y() || c.z() >= frame_.size.z());
+        return frame_.bounded() &&
+               (c.x() >= frame_.size.x() || c.y() >= frame_.size.y() || c.z() >= frame_.size.z());
     };
     std::uint8_t any = 0;
     for (int i = 0; i < m; ++i)
@@ -151,8 +155,8 @@ void CrossingBlocks::find_blocks(std::size_t n, std::vector<Block>& out) const {
         for (int j = 0; j < node_dim; ++j)
             for (int k = 0; k < node_dim; ++k) {
                 const std::uint8_t* s = &state[static_cast<std::size_t>((i * m + j) * m + k)];
-                const int around = s[0] | s[1] | s[m] | s[m + 1] | s[m * m] | s[m * m + 1] | s[m * m + m] |
-                                   s[m * m + m + 1];
+                const int around =
+                    s[0] | s[1] | s[m] | s[m + 1] | s[m * m] | s[m * m + 1] | s[m * m + m] | s[m * m + m + 1];
                 const Coord origin = node.origin.offsetBy(8 * i, 8 * j, 8 * k);
                 if (around == mixed && !outside(origin))
                     out.push_back({origin, static_cast<std::int32_t>(n), place(i, j, k)});
@@ -169,13 +173,16 @@ CrossingBlocks::Place CrossingBlocks::step(const Block& block, int side) const {
 
 std::int64_t CrossingBlocks::neighbour(std::size_t b, int side) const {
     const Place p = step(blocks_[b], side);
-    return p.node < 0 ? -1 : nodes_[static_cast<std::size_t>(p.node)].block[static_cast<std::size_t>(p.block)];
+    return p.node < 0 ? -1
+                      : nodes_[static_cast<std::size_t>(p.node)].block[static_cast<std::size_t>(p.block)];
 }
 
 /// The part of the samples that comes from the block itself (side 0) or an upper neighbour.
 void CrossingBlocks::load_rows(const Block& block, int side, BlockSamples& out) const {
     const Place p = step(block, side);
-    const Leaf* source = p.node < 0 ? nullptr : nodes_[static_cast<std::size_t>(p.node)].leaf[static_cast<std::size_t>(p.block)];
+    const Leaf* source =
+        p.node < 0 ? nullptr
+                   : nodes_[static_cast<std::size_t>(p.node)].leaf[static_cast<std::size_t>(p.block)];
     const float constant = source ? 0 : tree_.getValue(offset(block.origin, side, leaf::dim));
     const float* in = source ? source->buffer().data() : nullptr;
     const int nx = side & 1 ? 1 : leaf::dim, ny = side & 2 ? 1 : leaf::dim;
@@ -183,7 +190,8 @@ void CrossingBlocks::load_rows(const Block& block, int side, BlockSamples& out) 
     for (int x = 0; x < nx; ++x)
         for (int y = 0; y < ny; ++y) {
             float* row = out.values[x0 + x][y0 + y];
-            std::uint16_t& bits = out.inside[static_cast<std::size_t>(x0 + x)][static_cast<std::size_t>(y0 + y)];
+            std::uint16_t& bits =
+                out.inside[static_cast<std::size_t>(x0 + x)][static_cast<std::size_t>(y0 + y)];
             if (side & 4) {
                 const float last = in ? in[leaf::offset(x, y, 0)] : constant;
                 row[leaf::dim] = last;
@@ -199,7 +207,8 @@ void CrossingBlocks::load_rows(const Block& block, int side, BlockSamples& out) 
 }
 
 void CrossingBlocks::load(std::size_t b, BlockSamples& out) const {
-    for (int side = 0; side < 8; ++side) load_rows(blocks_[b], side, out);  // the z neighbours (4…7) come last
+    for (int side = 0; side < 8; ++side)
+        load_rows(blocks_[b], side, out);  // the z neighbours (4…7) come last
 }
 
 }  // namespace vdbgeo

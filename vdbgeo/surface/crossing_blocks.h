@@ -22,15 +22,18 @@ struct BlockSamples {
     std::array<std::array<std::uint16_t, dim>, dim> inside;
 };
 
-/// The blocks of a grid whose cells, or whose edges, may cross the isovalue: those where a sample of the block or
-/// of its upper neighbours' first layers lies on the other side than another. A block is aligned to the leaves but
-/// need not be one: a level set also runs between a leaf and a tile, and between two tiles.
+/// The blocks of a grid whose cells, or whose edges, may cross the isovalue: those where a sample of the
+/// block or of its upper neighbours' first layers lies on the other side than another. A block is aligned to
+/// the leaves but need not be one: a level set also runs between a leaf and a tile, and between two tiles.
 ///
-/// Finding them reads every leaf once (bandwidth-bound) and looks at every lower internal node's 16³ children.
+/// Finding them reads every leaf once (bandwidth-bound) and looks at every lower internal node's 16³
+/// children.
 class CrossingBlocks {
  public:
-    /// Throws InvalidInput where a constant tile of 4096³ voxels lies across the isovalue from the background.
-    CrossingBlocks(const openvdb::FloatTree& tree, const Frame& frame, float isovalue, const Progress& progress);
+    /// Throws InvalidInput where a constant tile of 4096³ voxels lies across the isovalue from the
+    /// background.
+    CrossingBlocks(const openvdb::FloatTree& tree, const Frame& frame, float isovalue,
+                   const Progress& progress);
 
     std::size_t size() const { return blocks_.size(); }
     /// Index of the first voxel of block b. The order is fixed by the coordinates alone.
@@ -42,17 +45,17 @@ class CrossingBlocks {
     void load(std::size_t b, BlockSamples& out) const;
 
  private:
-    static constexpr int node_dim = 16;                  // blocks along an edge of a node
+    static constexpr int node_dim = 16;  // blocks along an edge of a node
     static constexpr int node_blocks = node_dim * node_dim * node_dim;
     enum State : std::uint8_t { below = 1, above = 2, mixed = 3 };
 
     struct Node {
         openvdb::Coord origin;
-        std::array<int, 8> upper{};              // this node and its upper neighbours, -1 outside all nodes
+        std::array<int, 8> upper{};  // this node and its upper neighbours, -1 outside all nodes
         std::array<std::uint8_t, 8> upper_state{};  // of those that are outside all nodes
-        std::vector<std::uint8_t> state;         // per block
-        std::vector<const leaf::Leaf*> leaf;     // per block, null for a tile
-        std::vector<std::int32_t> block;         // per block, its number or -1
+        std::vector<std::uint8_t> state;            // per block
+        std::vector<const leaf::Leaf*> leaf;        // per block, null for a tile
+        std::vector<std::int32_t> block;            // per block, its number or -1
     };
     struct Block {
         openvdb::Coord origin;

@@ -23,17 +23,18 @@ struct BitCounts {
     std::array<std::uint8_t, 256> of{};
     constexpr BitCounts() {
         for (int i = 1; i < 256; ++i)
-            of[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>((i & 1) + of[static_cast<std::size_t>(i / 2)]);
+            of[static_cast<std::size_t>(i)] =
+                static_cast<std::uint8_t>((i & 1) + of[static_cast<std::size_t>(i / 2)]);
     }
 };
 constexpr BitCounts bit_counts;
 constexpr unsigned count_bits(unsigned byte) { return bit_counts.of[byte & 0xFF]; }
 
-/// The crossed grid edges whose lower end lies in one block, in the order of their vertices: by row (x, y), then
-/// axis, then z.
+/// The crossed grid edges whose lower end lies in one block, in the order of their vertices: by row (x, y),
+/// then axis, then z.
 struct BlockEdges {
     std::array<std::array<std::uint8_t, 3>, leaf::rows> crossed{};  // bit z of [row][axis]
-    std::array<std::uint16_t, leaf::rows> row_first{};              // number of the row's first vertex in the block
+    std::array<std::uint16_t, leaf::rows> row_first{};  // number of the row's first vertex in the block
     std::uint16_t edge_vertices = 0;
     std::uint16_t extra_vertices = 0;
     std::uint32_t triangles = 0;
@@ -54,13 +55,15 @@ void for_each_crossed_cell(const BlockSamples& s, const Vec3i& cells, const Visi
     const unsigned in_box = (1u << cells.z()) - 1;
     for (std::size_t x = 0; x < static_cast<std::size_t>(cells.x()); ++x)
         for (std::size_t y = 0; y < static_cast<std::size_t>(cells.y()); ++y) {
-            const unsigned a = s.inside[x][y], b = s.inside[x + 1][y], c = s.inside[x][y + 1], d = s.inside[x + 1][y + 1];
+            const unsigned a = s.inside[x][y], b = s.inside[x + 1][y], c = s.inside[x][y + 1],
+                           d = s.inside[x + 1][y + 1];
             const unsigned any = a | b | c | d, all = a & b & c & d;
             for (unsigned left = (any | any >> 1) & ~(all & all >> 1) & in_box; left; left &= left - 1) {
                 const int z = __builtin_ctz(left);
                 const auto bits = [z](unsigned row) { return row >> z & 1; };
-                const unsigned sign_case = bits(a) | bits(b) << 1 | bits(c) << 2 | bits(d) << 3 | bits(a >> 1) << 4 |
-                                           bits(b >> 1) << 5 | bits(c >> 1) << 6 | bits(d >> 1) << 7;
+                const unsigned sign_case = bits(a) | bits(b) << 1 | bits(c) << 2 | bits(d) << 3 |
+                                           bits(a >> 1) << 4 | bits(b >> 1) << 5 | bits(c >> 1) << 6 |
+                                           bits(d >> 1) << 7;
                 visit(static_cast<int>(x), static_cast<int>(y), z, static_cast<int>(sign_case));
             }
         }
@@ -78,7 +81,8 @@ class Extraction {
           hard_cells_((blocks_.size() + chunk - 1) / chunk) {}
 
     TriMesh run() {
-        for_each_chunk(0.2, 0.5, [this](std::size_t b, BlockSamples& samples, std::size_t) { count(b, samples); });
+        for_each_chunk(0.2, 0.5,
+                       [this](std::size_t b, BlockSamples& samples, std::size_t) { count(b, samples); });
         const auto [vertices, triangles] = number();
         mesh_.points.resize(vertices);
         mesh_.triangles.resize(triangles);
@@ -105,7 +109,8 @@ class Extraction {
                 body(b, samples, hard);
             }
             const std::size_t now = done += end - begin;
-            if ((now / chunk) % 64 == 0) progress.report(static_cast<double>(now) / static_cast<double>(blocks_.size()));
+            if ((now / chunk) % 64 == 0)
+                progress.report(static_cast<double>(now) / static_cast<double>(blocks_.size()));
         });
         progress.report(1);
     }
@@ -125,7 +130,8 @@ class Extraction {
     static std::array<double, 8> cell_values(const BlockSamples& s, int x, int y, int z, double isovalue) {
         std::array<double, 8> d;
         for (int c = 0; c < 8; ++c)
-            d[static_cast<std::size_t>(c)] = s.values[x + (c & 1)][y + (c >> 1 & 1)][z + (c >> 2 & 1)] - isovalue;
+            d[static_cast<std::size_t>(c)] =
+                s.values[x + (c & 1)][y + (c >> 1 & 1)][z + (c >> 2 & 1)] - isovalue;
         return d;
     }
 
@@ -175,8 +181,8 @@ class Extraction {
             triangles += e.triangles;
         }
         if (vertices > TriMesh::max_vertices)
-            throw InvalidInput(fmt::format("the surface has {} vertices, more than 2^32-1: noise, or work for blocks",
-                                           vertices));
+            throw InvalidInput(fmt::format(
+                "the surface has {} vertices, more than 2^32-1: noise, or work for blocks", vertices));
         return {vertices, triangles};
     }
 
@@ -199,9 +205,11 @@ class Extraction {
             for (int y = 0; y < dim; ++y)
                 for (int a = 0; a < 3; ++a) {
                     const auto row = static_cast<std::size_t>(leaf::row(x, y));
-                    for (unsigned left = edges.crossed[row][static_cast<std::size_t>(a)]; left; left &= left - 1) {
+                    for (unsigned left = edges.crossed[row][static_cast<std::size_t>(a)]; left;
+                         left &= left - 1) {
                         const int z = __builtin_ctz(left);
-                        const float from = s.values[x][y][z], to = s.values[x + (a == 0)][y + (a == 1)][z + (a == 2)];
+                        const float from = s.values[x][y][z],
+                                    to = s.values[x + (a == 0)][y + (a == 1)][z + (a == 2)];
                         Vec3d place(x, y, z);
                         place[a] += crossing(from, to);
                         *out++ = world(origin, place);
@@ -237,7 +245,7 @@ class Extraction {
         std::array<VertexId, cell::edges + cell::max_centres> id;
         for_each_crossed_cell(s, cells_in_box(samples_in_box(b)), [&](int x, int y, int z, int sign_case) {
             const Pattern& p = cell::depends_on_values(sign_case) ? *hard_cells_[b / chunk][hard++]
-                                                                   : cell::simple_pattern(sign_case);
+                                                                  : cell::simple_pattern(sign_case);
             for (unsigned left = p.edge_mask; left; left &= left - 1) {
                 const int e = __builtin_ctz(left);
                 id[static_cast<std::size_t>(e)] = vertex_on(around, x, y, z, e);
@@ -266,7 +274,8 @@ class Extraction {
 }  // namespace
 
 void MarchingCubesOptions::check() const {
-    if (!std::isfinite(static_cast<float>(isovalue))) throw InvalidInput("the isovalue is not a finite number");
+    if (!std::isfinite(static_cast<float>(isovalue)))
+        throw InvalidInput("the isovalue is not a finite number");
 }
 
 TriMesh marching_cubes(const DensityMap& map, const MarchingCubesOptions& options, const Progress& progress) {

@@ -97,8 +97,12 @@ DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid) {
     const auto min = number("vdbgeo_min"), max = number("vdbgeo_max"), mean = number("vdbgeo_mean"),
                rms = number("vdbgeo_rms");
     if (samples && non_finite && min && max && mean && rms) {
-        map.statistics = {static_cast<std::uint64_t>(samples->value()), static_cast<std::uint64_t>(non_finite->value()),
-                          min->value(), max->value(), mean->value(), rms->value()};
+        map.statistics = {static_cast<std::uint64_t>(samples->value()),
+                          static_cast<std::uint64_t>(non_finite->value()),
+                          min->value(),
+                          max->value(),
+                          mean->value(),
+                          rms->value()};
     } else {
         map.statistics = statistics_of_active(*grid);
     }
@@ -107,7 +111,8 @@ DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid) {
 
 void add_history(openvdb::GridBase& grid, const std::string& line) {
     std::string history;
-    if (const auto old = grid.getMetadata<openvdb::StringMetadata>(history_key)) history = old->value() + "\n";
+    if (const auto old = grid.getMetadata<openvdb::StringMetadata>(history_key))
+        history = old->value() + "\n";
     set(grid, history_key, history + line);
 }
 

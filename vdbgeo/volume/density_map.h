@@ -47,12 +47,13 @@ struct DensityMap {
     Statistics statistics;
 };
 
-/// Writes the frame and the statistics into the grid's transform and metadata, so that they survive a VDB file.
+/// Writes the frame and the statistics into the grid's transform and metadata, so that they survive a VDB
+/// file.
 void store_frame(DensityMap& map);
 
-/// The inverse of store_frame for a grid from any source: a frame from the transform (InvalidInput where it is
-/// not linear), the box and the statistics from the metadata where they are there, else unbounded and computed
-/// from the active voxels.
+/// The inverse of store_frame for a grid from any source: a frame from the transform (InvalidInput where it
+/// is not linear), the box and the statistics from the metadata where they are there, else unbounded and
+/// computed from the active voxels.
 DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid);
 
 /// Appends one line to the grid's record of what was done to it (metadata `vdbgeo_history`).

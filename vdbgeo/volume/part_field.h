@@ -1,11 +1,11 @@
 // A smooth density built from blobs and tubes, evaluated row by row.
 #pragma once
 
-#include "vdbgeo/core/types.h"
-
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "vdbgeo/core/types.h"
 
 namespace vdbgeo {
 

@@ -1,8 +1,5 @@
 #include "vdbgeo/volume/phantom.h"
 
-#include "vdbgeo/core/errors.h"
-#include "vdbgeo/core/parallel.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
 
 namespace vdbgeo {
 

@@ -1,16 +1,16 @@
 // Test specimens with a known truth: analytic shapes, simulated specimens, and noise.
 #pragma once
 
-#include "vdbgeo/core/progress.h"
-#include "vdbgeo/volume/density_map.h"
-#include "vdbgeo/volume/specimen.h"
-
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/volume/density_map.h"
+#include "vdbgeo/volume/specimen.h"
 
 namespace vdbgeo {
 

@@ -1,13 +1,13 @@
 #include "vdbgeo/volume/specimen.h"
 
-#include "vdbgeo/core/errors.h"
-
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
+
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 

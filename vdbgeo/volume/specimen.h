@@ -1,10 +1,10 @@
 // Simulated specimens, shaped after six well-known cryo-EM maps.
 #pragma once
 
-#include "vdbgeo/volume/part_field.h"
-
 #include <string>
 #include <vector>
+
+#include "vdbgeo/volume/part_field.h"
 
 namespace vdbgeo {
 

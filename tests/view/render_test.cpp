@@ -1,0 +1,337 @@
+// Pictures of meshes of known shape.
+#include "vdbgeo/view/render.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "tests/support/meshes.h"
+#include "vdbgeo/core/errors.h"
+
+using namespace vdbgeo;
+using namespace vdbgeo::test;
+
+namespace {
+
+/// One bare view: nothing but the surface and the background.
+RenderOptions bare(const std::string& view = "front", int width = 300) {
+    RenderOptions options;
+    options.view = view;
+    options.width = width;
+    options.height = width;
+    options.occlusion_rays = 2;
+    options.scale_bar = options.axis_labels = false;
+    return options;
+}
+
+bool is_background(const Image& image, int x, int y) {
+    const std::uint8_t* p = image.at(x, y);
+    return p[0] == 255 && p[1] == 255 && p[2] == 255;
+}
+
+struct Silhouette {
+    double pixels = 0;
+    int left = 1 << 20, right = -1, top = 1 << 20, bottom = -1;
+    double width() const { return right - left + 1; }
+    double height() const { return bottom - top + 1; }
+};
+
+Silhouette silhouette(const Image& image) {
+    Silhouette s;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            if (!is_background(image, x, y)) {
+                ++s.pixels;
+                s.left = std::min(s.left, x), s.right = std::max(s.right, x);
+                s.top = std::min(s.top, y), s.bottom = std::max(s.bottom, y);
+            }
+    return s;
+}
+
+Vec3f colour_at(const Image& image, int x, int y) {
+    return Vec3f(image.at(x, y)[0], image.at(x, y)[1], image.at(x, y)[2]) / 255;
+}
+
+double mean_difference(const Image& a, const Image& b) {
+    if (a.width != b.width || a.height != b.height) return 1e9;
+    double sum = 0;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(int(a.pixels[i]) - int(b.pixels[i]));
+    return sum / static_cast<double>(a.pixels.size());
+}
+
+/// Without symmetry, so that every wrong turn shows.
+TriMesh lopsided() {
+    const TriMesh ball = moved(icosphere(3, 6), Mat3d::Identity(), Vec3d(9, 4, 7));
+    return joined(
+        moved(torus_mesh(10, 3, 48, 24), Eigen::AngleAxisd(0.5, Vec3d(1, 2, 0.5).normalized()).matrix()),
+        ball);
+}
+
+Mat3d turn(double degrees, const Vec3d& axis) {
+    return Eigen::AngleAxisd(degrees * M_PI / 180, axis).matrix();
+}
+
+#define NEEDS_EMBREE() \
+    if (!can_render()) GTEST_SKIP() << "this build has no ray caster"
+
+}  // namespace
+
+TEST(Render, SaysWhenTheBuildCannot) {
+    if (can_render()) GTEST_SKIP() << "this build can";
+    EXPECT_THROW(render(icosphere(1, 1)), InvalidInput);
+}
+
+TEST(Render, ASphereIsADiscAndTheRestIsBackground) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 600);
+    options.samples = 1;  // a pixel is either of the surface or not
+    const Silhouette s = silhouette(render(icosphere(5, 50), options));
+    EXPECT_NEAR(s.width(), s.height(), 2);
+    EXPECT_GT(s.width(), 500);
+    const double r = (s.width() + s.height()) / 4;
+    EXPECT_NEAR(s.pixels / (M_PI * r * r), 1, 0.01);
+    EXPECT_GT(s.left, 0);
+    EXPECT_LT(s.right, 599);
+}
+
+TEST(Render, ATorusFromTheTopHasItsHole) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("top", 500);
+    options.samples = 1;
+    const Image image = render(torus_mesh(30, 10, 256, 64), options);
+    const Silhouette s = silhouette(image);
+    const double pixel = s.width() / 80;
+    EXPECT_NEAR(s.pixels / (M_PI * (1600 - 400) * pixel * pixel), 1, 0.01);
+    EXPECT_TRUE(is_background(image, 250, 250));
+}
+
+TEST(Render, ViewsShowTheirAxes) {
+    NEEDS_EMBREE();
+    const Mat3d stretch = Vec3d(4, 2, 1).asDiagonal();
+    const TriMesh mesh = moved(icosphere(4, 10), stretch);
+    const auto ratio = [&](const char* view) {
+        const Silhouette s = silhouette(render(mesh, bare(view)));
+        return s.width() / s.height();
+    };
+    EXPECT_NEAR(ratio("front"), 4, 0.1);
+    EXPECT_NEAR(ratio("side"), 2, 0.05);
+    EXPECT_NEAR(ratio("top"), 2, 0.05);
+    // A ball at the far end of each axis of the picture.
+    const auto lies = [&](const char* view, const Vec3d& where) {
+        const TriMesh two = joined(icosphere(3, 10), moved(icosphere(2, 2), Mat3d::Identity(), 30 * where));
+        const Image image = render(two, bare(view));
+        const Silhouette s = silhouette(image);
+        double x = 0, y = 0;
+        for (int j = 0; j < image.height; ++j)
+            for (int i = 0; i < image.width; ++i)
+                if (!is_background(image, i, j)) x += i, y += j;
+        // The heavy ball is opposite to the light one.
+        return Vec2d(0.5 * (s.left + s.right) - x / s.pixels, y / s.pixels - 0.5 * (s.top + s.bottom));
+    };
+    EXPECT_GT(lies("front", Vec3d::UnitX()).x(), 20);
+    EXPECT_GT(lies("front", Vec3d::UnitZ()).y(), 20);
+    EXPECT_GT(lies("side", Vec3d::UnitY()).x(), 20);
+    EXPECT_GT(lies("side", Vec3d::UnitZ()).y(), 20);
+    EXPECT_GT(lies("top", Vec3d::UnitX()).x(), 20);
+    EXPECT_GT(lies("top", Vec3d::UnitY()).y(), 20);
+}
+
+TEST(Render, ATurnedMeshGivesTheTurnedView) {
+    NEEDS_EMBREE();
+    const TriMesh mesh = lopsided();
+    const Image front = render(mesh, bare("front", 200));
+    EXPECT_LT(mean_difference(front, render(moved(mesh, turn(90, Vec3d::UnitZ())), bare("side", 200))), 0.2);
+    EXPECT_LT(mean_difference(front, render(moved(mesh, turn(-90, Vec3d::UnitX())), bare("top", 200))), 0.2);
+    EXPECT_GT(mean_difference(front, render(mesh, bare("side", 200))), 5);
+    EXPECT_GT(mean_difference(front, render(mesh, bare("top", 200))), 5);
+}
+
+TEST(Render, SizeAndPlaceDoNotMatter) {
+    NEEDS_EMBREE();
+    const TriMesh mesh = lopsided();
+    const Image image = render(mesh, bare("iso", 200));
+    for (const double scale : {1e-8, 1e8})
+        EXPECT_LT(mean_difference(image, render(moved(mesh, scale * Mat3d::Identity()), bare("iso", 200))),
+                  0.2)
+            << scale;
+    const TriMesh far = moved(mesh, Mat3d::Identity(), Vec3d(4096, -8192, 2048));
+    EXPECT_LT(mean_difference(image, render(far, bare("iso", 200))), 0.5);
+}
+
+TEST(Render, TheInsideHasAnotherColour) {
+    NEEDS_EMBREE();
+    const RenderOptions options = bare("top", 200);
+    const TriMesh ball = icosphere(4, 10);
+    const Vec3f outside = colour_at(render(ball, options), 95, 95),
+                inside = colour_at(render(flipped(ball), options), 95, 95);
+    EXPECT_GT(outside.z(), outside.x());  // the plain colour is blue,
+    EXPECT_GT(inside.x(), inside.z());    // the inside's ochre
+    // From obliquely above an open tube shows both.
+    const Image tube = render(open_cylinder_mesh(10, 12), bare("iso", 200));
+    int blue = 0, ochre = 0;
+    for (int y = 0; y < 200; ++y)
+        for (int x = 0; x < 200; ++x) {
+            const Vec3f c = colour_at(tube, x, y);
+            blue += c.z() > c.x() + 0.05f;
+            ochre += c.x() > c.z() + 0.05f;
+        }
+    EXPECT_GT(blue, 2000);
+    EXPECT_GT(ochre, 1000);
+}
+
+TEST(Render, ColoursFollowTheProperty) {
+    NEEDS_EMBREE();
+    TriMesh mesh = icosphere(4, 10);
+    MeshProperty x{"x", 1, {}};
+    for (const Vec3f& p : mesh.points) x.values.push_back(p.x());
+    mesh.vertex_properties.push_back(x);
+    RenderOptions options = bare("front", 200);
+    options.property = "x";
+    const int middle = 80;  // above the bars at the foot
+    const auto warmth = [&](const Image& image, int px) {
+        const Vec3f c = colour_at(image, px, middle);
+        return c.x() - c.z();
+    };
+    const Image image = render(mesh, options);
+    EXPECT_LT(warmth(image, 60), -0.1);  // negative: blue
+    EXPECT_NEAR(warmth(image, 100), 0, 0.05);
+    EXPECT_GT(warmth(image, 140), 0.1);  // positive: red
+    options.range_min = -1000;
+    options.range_max = 1000;  // a wide range: all near the middle's white
+    EXPECT_NEAR(warmth(render(mesh, options), 140), 0, 0.05);
+    mesh.vertex_properties[0].values.assign(mesh.points.size(), std::numeric_limits<float>::quiet_NaN());
+    options.range_min = options.range_max = std::nullopt;
+    EXPECT_NEAR(warmth(render(mesh, options), 140), 0, 0.05);  // grey
+}
+
+TEST(Render, ClassNumbersAreNotMixed) {
+    NEEDS_EMBREE();
+    TriMesh mesh = icosphere(4, 10);
+    MeshProperty type{"type", 1, {}};
+    for (const Vec3f& p : mesh.points) type.values.push_back(p.x() < 0 ? 0.0f : 3.0f);
+    mesh.vertex_properties.push_back(type);
+    RenderOptions options = bare("front", 200);
+    options.property = "type";
+    options.colormap = "categorical";
+    const Image image = render(mesh, options);
+    EXPECT_GT(colour_at(image, 60, 80).z(), colour_at(image, 60, 80).x());    // class 0: blue
+    EXPECT_GT(colour_at(image, 140, 80).x(), colour_at(image, 140, 80).z());  // class 3: red
+}
+
+TEST(Render, SameBytesForAnyNumberOfThreads) {
+    NEEDS_EMBREE();
+    RenderOptions options;
+    options.width = 320;
+    options.title = "threads";
+    const TriMesh mesh = torus_mesh(30, 12, 300, 120);
+    const auto with = [&](std::size_t threads) {
+        tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        return render(mesh, options).pixels;
+    };
+    const auto one = with(1);
+    EXPECT_TRUE(one == with(2));
+    EXPECT_TRUE(one == with(7));
+}
+
+TEST(Render, ThreeViewsShareTheScale) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("three", 900);
+    options.height = std::nullopt;
+    options.samples = 1;
+    const Image image = render(icosphere(5, 7), options);
+    const Silhouette s = silhouette(image);
+    EXPECT_NEAR(s.pixels / (3 * M_PI / 4 * s.height() * s.height()), 1, 0.012);
+    EXPECT_LT(image.height, 400);
+}
+
+TEST(Render, TheScaleBarHasItsLength) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 800);
+    options.scale_bar = true;
+    options.surface = Vec3f(1, 0.2f, 0.2f);
+    const Image image = render(icosphere(5, 100), options);
+    // The longest run of ink in the lower rows is the bar; the ball's width tells the scale.
+    int longest = 0, ball = 0;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0, run = 0, red = 0; x < image.width; ++x) {
+            const Vec3f c = colour_at(image, x, y);
+            run = c.maxCoeff() < 0.2f && c.maxCoeff() - c.minCoeff() < 0.01f ? run + 1 : 0;
+            red += !is_background(image, x, y) && y < 500;
+            longest = std::max(longest, run);
+            ball = std::max(ball, red);
+        }
+    EXPECT_NEAR(longest / (ball / 200.0), 50, 1.5);
+}
+
+TEST(Render, ZeroAreaFacesAndUnusedPointsDoNoHarm) {
+    NEEDS_EMBREE();
+    const TriMesh ball = icosphere(3, 10);
+    TriMesh worse = ball;
+    worse.points.push_back(Vec3f(1e6f, 0, 0));
+    worse.triangles.push_back({0, 0, 1});
+    worse.triangles.push_back({5, 5, 5});
+    EXPECT_LT(mean_difference(render(ball, bare()), render(worse, bare())), 0.02);
+    TriMesh flat;  // seen from its edge there is nothing
+    flat.points = {Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0)};
+    flat.triangles = {{0, 1, 2}};
+    EXPECT_EQ(silhouette(render(flat, bare("top"))).pixels > 1000, true);
+    EXPECT_NO_THROW(render(flat, bare("front")));
+    EXPECT_NO_THROW(render(flat));
+}
+
+TEST(Render, BadMeshesAreNamed) {
+    NEEDS_EMBREE();
+    EXPECT_THROW(render(TriMesh()), InvalidInput);
+    TriMesh point;
+    point.points = {Vec3f(1, 2, 3)};
+    point.triangles = {{0, 0, 0}};
+    EXPECT_THROW(render(point), InvalidInput);
+    TriMesh nan = icosphere(1, 1);
+    nan.points[3].y() = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_THROW(render(nan), InvalidInput);
+    TriMesh mesh = icosphere(1, 1);
+    mesh.vertex_properties.push_back({"normal", 3, std::vector<float>(3 * mesh.points.size())});
+    RenderOptions options = bare();
+    options.property = "normal";
+    EXPECT_THROW(render(mesh, options), InvalidInput);
+    options.property = "H";
+    EXPECT_THROW(render(mesh, options), InvalidInput);
+}
+
+TEST(Render, BadOptionsAreNamed) {
+    const auto bad = [](const std::function<void(RenderOptions&)>& change) {
+        RenderOptions options;
+        EXPECT_NO_THROW(options.check());
+        change(options);
+        EXPECT_THROW(options.check(), InvalidInput);
+    };
+    bad([](RenderOptions& o) { o.width = 10; });
+    bad([](RenderOptions& o) { o.height = Image::max_side + 1; });
+    bad([](RenderOptions& o) { o.view = "back"; });
+    bad([](RenderOptions& o) { o.colormap = "jet"; });
+    bad([](RenderOptions& o) { o.samples = 3; });
+    bad([](RenderOptions& o) { o.occlusion_rays = -1; });
+    bad([](RenderOptions& o) { o.range_min = std::numeric_limits<double>::infinity(); });
+    bad([](RenderOptions& o) { o.range_min = 2, o.range_max = 1; });
+    bad([](RenderOptions& o) { o.surface.x() = 2; });
+    bad([](RenderOptions& o) { o.background.y() = std::numeric_limits<float>::quiet_NaN(); });
+}
+
+TEST(Render, TooLittleRoomIsAnError) {
+    NEEDS_EMBREE();
+    RenderOptions options;
+    options.height = 64;
+    EXPECT_THROW(render(icosphere(1, 1), options), InvalidInput);
+}
+
+TEST(Render, ReportsProgressAndCancels) {
+    NEEDS_EMBREE();
+    std::atomic<int> reports = 0;
+    render(icosphere(2, 1), bare("front", 128), Progress([&](double) { return ++reports, true; }));
+    EXPECT_GT(reports, 4);
+    EXPECT_THROW(render(icosphere(2, 1), bare(), Progress([](double f) { return f < 0.3; })), Cancelled);
+}

@@ -1,0 +1,90 @@
+#include "vdbgeo/view/image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "vdbgeo/core/errors.h"
+
+namespace vdbgeo {
+namespace {
+
+double distance_to(const Segment& s, const Vec2d& p) {
+    const Vec2d along = s.to - s.from;
+    const double length2 = along.squaredNorm();
+    const double t = length2 > 0 ? std::clamp((p - s.from).dot(along) / length2, 0.0, 1.0) : 0.0;
+    return (s.from + t * along - p).norm();
+}
+
+/// The first and the last pixel that [low, high] touches inside [0, size).
+std::pair<int, int> touched(double low, double high, int size) {
+    return {static_cast<int>(std::clamp(std::floor(low), 0.0, double(size))),
+            static_cast<int>(std::clamp(std::ceil(high), 0.0, double(size)))};
+}
+
+}  // namespace
+
+Image::Image(int w, int h, const Vec3f& background) : width(w), height(h) {
+    if (w < 1 || h < 1 || w > max_side || h > max_side)
+        throw InvalidInput(
+            fmt::format("picture of {} x {} pixels: each side must be 1 to {}", w, h, max_side));
+    pixels.resize(3 * static_cast<std::size_t>(w) * static_cast<std::size_t>(h));
+    const std::uint8_t rgb[3] = {to_byte(background[0]), to_byte(background[1]), to_byte(background[2])};
+    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = rgb[i % 3];
+}
+
+void Image::set(int x, int y, const Vec3f& colour) {
+    for (int c = 0; c < 3; ++c) at(x, y)[c] = to_byte(colour[c]);
+}
+
+std::uint8_t to_byte(float channel) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
+}
+
+void blend(Image& image, int x, int y, const Vec3f& colour, double cover) {
+    if (x < 0 || y < 0 || x >= image.width || y >= image.height || !(cover > 0)) return;
+    const float c = static_cast<float>(std::min(cover, 1.0));
+    std::uint8_t* pixel = image.at(x, y);
+    for (int k = 0; k < 3; ++k) pixel[k] = to_byte(pixel[k] / 255.0f * (1 - c) + colour[k] * c);
+}
+
+void fill_rectangle(Image& image, double x0, double y0, double x1, double y1, const Vec3f& colour) {
+    const auto [left, right] = touched(x0, x1, image.width);
+    const auto [top, bottom] = touched(y0, y1, image.height);
+    for (int y = top; y < bottom; ++y)
+        for (int x = left; x < right; ++x) {
+            const double wide = std::min(x1, x + 1.0) - std::max(x0, double(x));
+            const double high = std::min(y1, y + 1.0) - std::max(y0, double(y));
+            blend(image, x, y, colour, std::max(wide, 0.0) * std::max(high, 0.0));
+        }
+}
+
+void draw_segments(Image& image, const std::vector<Segment>& segments, double thickness,
+                   const Vec3f& colour) {
+    if (segments.empty()) return;
+    Vec2d low = segments[0].from, high = low;
+    for (const Segment& s : segments) {
+        low = low.cwiseMin(s.from).cwiseMin(s.to);
+        high = high.cwiseMax(s.from).cwiseMax(s.to);
+    }
+    const double half = thickness / 2, reach = half + 1;
+    const auto [left, right] = touched(low.x() - reach, high.x() + reach, image.width);
+    const auto [top, bottom] = touched(low.y() - reach, high.y() + reach, image.height);
+    for (int y = top; y < bottom; ++y)
+        for (int x = left; x < right; ++x) {
+            double nearest = reach;
+            for (const Segment& s : segments)
+                nearest = std::min(nearest, distance_to(s, Vec2d(x + 0.5, y + 0.5)));
+            // A line thinner than a pixel is a pixel wide and fainter.
+            const double cover = std::clamp(std::max(half, 0.5) - nearest + 0.5, 0.0, 1.0);
+            blend(image, x, y, colour, cover * std::min(1.0, thickness));
+        }
+}
+
+void draw_line(Image& image, const Vec2d& from, const Vec2d& to, double thickness, const Vec3f& colour) {
+    draw_segments(image, {{from, to}}, thickness, colour);
+}
+
+}  // namespace vdbgeo

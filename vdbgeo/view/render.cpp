@@ -1,0 +1,514 @@
+#include "vdbgeo/view/render.h"
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/view/layout.h"
+#ifdef VDBGEO_HAS_EMBREE
+#include <embree3/rtcore.h>
+#endif
+
+namespace vdbgeo {
+
+void RenderOptions::check() const {
+    const auto need = [](bool good, const std::string& message) {
+        if (!good) throw InvalidInput(message);
+    };
+    const auto side = [&](const char* name, int value) {
+        need(value >= 64 && value <= Image::max_side,
+             fmt::format("{} of {} pixels is not in 64 to {}", name, value, Image::max_side));
+    };
+    const auto colour = [&](const char* name, const Vec3f& c) {
+        need(c.allFinite() && c.minCoeff() >= 0 && c.maxCoeff() <= 1,
+             fmt::format("{} colour ({}, {}, {}) is not in 0 to 1", name, c[0], c[1], c[2]));
+    };
+    side("width", width);
+    if (height) side("height", *height);
+    find_views(view);
+    if (colormap) Colormap{*colormap};
+    need(samples == 1 || samples == 4 || samples == 9 || samples == 16,
+         fmt::format("samples a pixel: {} is not 1, 4, 9 or 16", samples));
+    need(occlusion_rays >= 0 && occlusion_rays <= 1024,
+         fmt::format("occlusion rays: {} is not in 0 to 1024", occlusion_rays));
+    need(!range_min || std::isfinite(*range_min), "the colour range's minimum is not a finite number");
+    need(!range_max || std::isfinite(*range_max), "the colour range's maximum is not a finite number");
+    need(!range_min || !range_max || *range_min < *range_max,
+         fmt::format("the colour range {} to {} is empty", range_min.value_or(0), range_max.value_or(0)));
+    colour("surface", surface);
+    colour("inside", inside);
+    colour("background", background);
+}
+
+#ifndef VDBGEO_HAS_EMBREE
+
+bool can_render() { return false; }
+
+Image render(const TriMesh&, const RenderOptions& options, const Progress&) {
+    options.check();
+    throw InvalidInput("this build has no ray caster (embree): pictures of surfaces cannot be made");
+}
+
+#else
+
+namespace {
+
+using Vec3fs = Array<Vec3f>;
+
+Vec3f linear(const Vec3f& srgb) { return srgb.unaryExpr(&srgb_to_linear); }
+
+/// The mesh moved into the unit ball about the origin, with vertex normals.
+struct Model {
+    Vec3d centre;
+    double radius = 0;  // Å a unit
+    Vec3fs points, normals;
+    const Array<Triangle>* triangles = nullptr;
+};
+
+Model make_model(const TriMesh& mesh) {
+    Model model;
+    Vec3d low = Vec3d::Constant(1e300), high = -low;
+    for (const Triangle& t : mesh.triangles)
+        for (const VertexId v : t) {
+            low = low.cwiseMin(mesh.points[v].cast<double>());
+            high = high.cwiseMax(mesh.points[v].cast<double>());
+        }
+    model.centre = (low + high) / 2;
+    model.radius = (high - low).norm() / 2;
+    if (!(model.radius > 0)) throw InvalidInput("the mesh has no extent: all its points coincide");
+    model.triangles = &mesh.triangles;
+    model.points.resize(mesh.points.size());
+    parallel_for(mesh.points.size(), 4096, [&](std::size_t i) {
+        model.points[i] = ((mesh.points[i].cast<double>() - model.centre) / model.radius).cast<float>();
+    });
+    model.normals.assign(mesh.points.size(), Vec3f::Zero());
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3f& a = model.points[t[0]];
+        const Vec3f normal = (model.points[t[1]] - a).cross(model.points[t[2]] - a);
+        for (const VertexId v : t) model.normals[v] += normal;
+    }
+    parallel_for(model.normals.size(), 4096, [&](std::size_t i) {
+        const float length = model.normals[i].norm();
+        if (length > 0) model.normals[i] /= length;
+    });
+    return model;
+}
+
+ViewBox box_in_view(const Model& model, const View& view) {
+    Mat3d axes;
+    axes << view.right, view.up, view.towards;
+    const ViewBox nothing{Vec3d::Constant(1e300), Vec3d::Constant(-1e300)};
+    const auto& triangles = *model.triangles;
+    return fixed_order_reduce(
+        triangles.size(), 4096, nothing,
+        [&](std::size_t begin, std::size_t end) {
+            ViewBox box = nothing;
+            for (std::size_t f = begin; f < end; ++f)
+                for (const VertexId v : triangles[f]) {
+                    const Vec3d p = axes.transpose() * model.points[v].cast<double>() * model.radius;
+                    box.low = box.low.cwiseMin(p);
+                    box.high = box.high.cwiseMax(p);
+                }
+            return box;
+        },
+        [](ViewBox& all, const ViewBox& part) {
+            all.low = all.low.cwiseMin(part.low);
+            all.high = all.high.cwiseMax(part.high);
+        });
+}
+
+/// Embree's device and scene over a model's arrays.
+class RayCaster {
+ public:
+    explicit RayCaster(const Model& model) : device_(rtcNewDevice(nullptr)) {
+        if (!device_) throw NumericalError("the ray caster (embree) could not be started");
+        scene_ = rtcNewScene(device_);
+        rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+        RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+        // Embree reads 16 bytes at each point: its own, padded buffer has them.
+        void* points = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                               sizeof(Vec3f), model.points.size());
+        void* faces = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                              sizeof(Triangle), model.triangles->size());
+        if (points && faces) {
+            std::copy(model.points.begin(), model.points.end(), static_cast<Vec3f*>(points));
+            std::copy(model.triangles->begin(), model.triangles->end(), static_cast<Triangle*>(faces));
+            rtcCommitGeometry(geometry);
+            rtcAttachGeometry(scene_, geometry);
+            rtcCommitScene(scene_);
+        }
+        rtcReleaseGeometry(geometry);
+        const RTCError error = rtcGetDeviceError(device_);
+        if (error != RTC_ERROR_NONE) {
+            release();
+            throw NumericalError(fmt::format("the ray caster (embree) failed on {} faces, error {}",
+                                             model.triangles->size(), static_cast<int>(error)));
+        }
+    }
+    ~RayCaster() { release(); }
+    RayCaster(const RayCaster&) = delete;
+    RayCaster& operator=(const RayCaster&) = delete;
+
+    struct Hit {
+        std::uint32_t face;
+        float distance, u, v;
+    };
+
+    std::optional<Hit> first(const Vec3f& origin, const Vec3f& direction) const {
+        RTCRayHit query{};
+        set(query.ray, origin, direction, std::numeric_limits<float>::infinity());
+        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcIntersect1(scene_, &context, &query);
+        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+        return Hit{query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
+    }
+
+    static constexpr int packet = 8;
+
+    /// How many of `count` ≤ packet rays from one point meet something before their length.
+    int blocked(const Vec3f& origin, const Vec3f* directions, const float* lengths, int count) const {
+        RTCRay8 rays{};
+        alignas(32) int valid[packet];
+        for (int i = 0; i < packet; ++i) {
+            const int k = std::min(i, count - 1);
+            valid[i] = i < count ? -1 : 0;
+            rays.org_x[i] = origin.x(), rays.org_y[i] = origin.y(), rays.org_z[i] = origin.z();
+            rays.dir_x[i] = directions[k].x(), rays.dir_y[i] = directions[k].y(),
+            rays.dir_z[i] = directions[k].z();
+            rays.tfar[i] = lengths[k];
+            rays.mask[i] = ~0u;
+        }
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcOccluded8(valid, scene_, &context, &rays);
+        int result = 0;
+        for (int i = 0; i < count; ++i) result += rays.tfar[i] < 0;
+        return result;
+    }
+
+ private:
+    static void set(RTCRay& ray, const Vec3f& origin, const Vec3f& direction, float length) {
+        ray.org_x = origin.x(), ray.org_y = origin.y(), ray.org_z = origin.z();
+        ray.dir_x = direction.x(), ray.dir_y = direction.y(), ray.dir_z = direction.z();
+        ray.tfar = length;
+        ray.mask = ~0u;
+    }
+    void release() {
+        rtcReleaseScene(scene_);
+        rtcReleaseDevice(device_);
+    }
+
+    RTCDevice device_;
+    RTCScene scene_ = nullptr;
+};
+
+/// What one primary ray found. Directions are in camera axes: right, up, towards the viewer.
+struct Sample {
+    bool hit = false, inside = false;
+    float depth = 0;     // along `towards`, model units
+    float open = 1;      // share of the hemisphere that is free
+    float lit = 1;       // share of the key light that arrives
+    Vec3f normal, base;  // base: linear light
+};
+
+/// The lights, in camera axes.
+const Vec3f key_light = Vec3f(-0.54f, 0.62f, 0.57f).normalized();
+const Vec3f fill_light = Vec3f(0.75f, -0.15f, 0.64f).normalized();
+constexpr float occlusion_reach = 0.5f;  // of the mesh's radius
+constexpr float ray_offset = 2e-5f;      // of the mesh's radius: some 100 units in the last place
+
+/// A well mixed number in [0, 1) from four integers.
+float noise(std::uint32_t x, std::uint32_t y, std::uint32_t i, std::uint32_t stream) {
+    std::uint64_t h = (std::uint64_t(x) << 32 | y) * 0x9E3779B97F4A7C15ull;
+    h ^= (std::uint64_t(i) << 32 | stream) * 0xC2B2AE3D27D4EB4Full + (h >> 29);
+    h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
+    h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
+    return static_cast<float>((h ^ (h >> 32)) >> 40 & 0xFFFFFF) * 0x1p-24f;
+}
+
+/// Two unit vectors that make a right-handed frame with the unit vector n.
+std::pair<Vec3f, Vec3f> tangents(const Vec3f& n) {
+    const Vec3f helper = std::abs(n.z()) < 0.9f ? Vec3f::UnitZ() : Vec3f::UnitX();
+    const Vec3f t = helper.cross(n).normalized();
+    return {t, n.cross(t)};
+}
+
+/// Everything that the pixels of a picture share.
+struct Scene {
+    const Model& model;
+    const RayCaster& rays;
+    const RenderOptions& options;
+    const MeshProperty* property;
+    const std::optional<ColourScale>& scale;
+    int grid;  // samples along a pixel's side
+};
+
+/// A panel's camera: model = axes · (right, up, towards).
+struct Camera {
+    Eigen::Matrix3f axes;
+    float left, top, step;  // corner of sample (0, 0) and the distance of samples, model units
+    float near, far;        // depths of the model
+};
+
+Vec3f base_colour(const Scene& scene, const RayCaster::Hit& hit, const Triangle& t, bool inside) {
+    if (!scene.property) return linear(inside ? scene.options.inside : scene.options.surface);
+    const auto& values = scene.property->values;
+    const float w = 1 - hit.u - hit.v;
+    double value = w * values[t[0]] + hit.u * values[t[1]] + hit.v * values[t[2]];
+    if (scene.scale->map.categories() > 0)
+        value = values[w >= hit.u && w >= hit.v ? t[0] : hit.u >= hit.v ? t[1] : t[2]];
+    return linear(scene.scale->colour(value)) * (inside ? 0.35f : 1.0f);
+}
+
+/// Ambient occlusion by cosine-weighted rays. Neighbouring samples take interleaved parts of one pattern, so
+/// that averaging over 4×4 of them sees sixteen times as many evenly spread directions.
+float open_share(const Scene& scene, const Camera& camera, const Vec3f& origin, const Vec3f& normal,
+                 const Vec3f& face_normal, std::uint32_t x, std::uint32_t y) {
+    static constexpr std::uint32_t order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
+    const int n = scene.options.occlusion_rays;
+    if (n == 0) return 1;
+    const auto [tangent, bitangent] = tangents(normal);
+    const float turn = static_cast<float>(order[(y & 3) * 4 + (x & 3)]) / 16;
+    const float shift = static_cast<float>(order[((x + 1) & 3) * 4 + ((y + 2) & 3)]) / 16;
+    constexpr int packet = RayCaster::packet;
+    Vec3f directions[packet];
+    float lengths[packet];
+    int blocked = 0;
+    for (int i = 0; i < n; ++i) {
+        const std::uint32_t ray = static_cast<std::uint32_t>(i);
+        const float u = (static_cast<float>(i) + shift + noise(x, y, ray, 0) / 16) / static_cast<float>(n);
+        const float angle =
+            6.2831853f * (static_cast<float>(i) * 0.61803399f + turn + noise(x, y, ray, 1) / 16);
+        const float flat = std::sqrt(u);
+        Vec3f d = flat * std::cos(angle) * tangent + flat * std::sin(angle) * bitangent +
+                  std::sqrt(std::max(0.0f, 1 - u)) * normal;
+        const float below = d.dot(face_normal);
+        if (below < 0) d -= 2 * below * face_normal;  // a smooth normal may lean over its flat face
+        directions[i % packet] = camera.axes * d;
+        lengths[i % packet] = occlusion_reach * (0.05f + 0.95f * noise(x, y, ray, 2));
+        if (i % packet == packet - 1 || i == n - 1)
+            blocked += scene.rays.blocked(origin, directions, lengths, i % packet + 1);
+    }
+    return 1 - static_cast<float>(blocked) / static_cast<float>(n);
+}
+
+float key_share(const Scene& scene, const Camera& camera, const Vec3f& origin, const Vec3f& face_normal,
+                std::uint32_t x, std::uint32_t y) {
+    if (!scene.options.shadows) return 1;
+    constexpr int n = 4;
+    const auto [tangent, bitangent] = tangents(key_light);
+    Vec3f directions[n];
+    float lengths[n];
+    int above = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const float radius = 0.2f * std::sqrt((static_cast<float>(i) + noise(x, y, i, 3)) / n);
+        const float angle = 6.2831853f * (static_cast<float>(i) * 0.61803399f + noise(x, y, 0, 4));
+        const Vec3f d =
+            (key_light + radius * (std::cos(angle) * tangent + std::sin(angle) * bitangent)).normalized();
+        if (d.dot(face_normal) <= 0) continue;
+        directions[above] = camera.axes * d;
+        lengths[above++] = 4.0f;
+    }
+    if (above == 0) return 0;
+    return static_cast<float>(above - scene.rays.blocked(origin, directions, lengths, above)) / n;
+}
+
+Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
+    Sample sample;
+    const float x = camera.left + (static_cast<float>(column) + 0.5f) * camera.step;
+    const float y = camera.top - (static_cast<float>(row) + 0.5f) * camera.step;
+    const Vec3f towards = camera.axes.col(2);
+    const Vec3f eye = camera.axes * Vec3f(x, y, 2.0f);
+    const auto hit = scene.rays.first(eye, -towards);
+    if (!hit) return sample;
+    const Triangle& t = (*scene.model.triangles)[hit->face];
+    const auto& p = scene.model.points;
+    const auto& n = scene.model.normals;
+    const Vec3f face = camera.axes.transpose() * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+    const float w = 1 - hit->u - hit->v;
+    sample.hit = true;
+    sample.inside = face.z() < 0;
+    const Vec3f face_normal = face.normalized() * (sample.inside ? -1.0f : 1.0f);
+    Vec3f normal = camera.axes.transpose() * (w * n[t[0]] + hit->u * n[t[1]] + hit->v * n[t[2]]);
+    if (sample.inside) normal = -normal;
+    // A smooth normal that looks away from the viewer is turned to the horizon.
+    normal.z() = std::max(normal.z(), 0.0f);
+    sample.normal = normal.norm() > 1e-6f ? Vec3f(normal.normalized()) : face_normal;
+    sample.base = base_colour(scene, *hit, t, sample.inside);
+    const Vec3f point = w * p[t[0]] + hit->u * p[t[1]] + hit->v * p[t[2]];
+    sample.depth = point.dot(towards);
+    const Vec3f origin = point + camera.axes * (ray_offset * face_normal);
+    const auto ux = static_cast<std::uint32_t>(column), uy = static_cast<std::uint32_t>(row);
+    sample.open = open_share(scene, camera, origin, sample.normal, face_normal, ux, uy);
+    sample.lit = key_share(scene, camera, origin, face_normal, ux, uy);
+    return sample;
+}
+
+/// The samples of a tile and of a border around it.
+struct Tile {
+    int columns, rows;
+    std::vector<Sample> samples;
+    const Sample& at(int x, int y) const {
+        return samples[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
+                       static_cast<std::size_t>(x)];
+    }
+};
+
+/// Occlusion and light averaged over the neighbours that lie on the same piece of surface.
+std::pair<float, float> smooth_light(const Tile& tile, int x, int y, int reach, float step) {
+    const Sample& here = tile.at(x, y);
+    float weight = 0, open = 0, lit = 0;
+    for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx) {
+            const Sample& other = tile.at(x + dx, y + dy);
+            if (!other.hit || other.inside != here.inside) continue;
+            const float like = here.normal.dot(other.normal);
+            if (like < 0.7f) continue;
+            const Vec3f apart(static_cast<float>(dx) * step, static_cast<float>(-dy) * step,
+                              other.depth - here.depth);
+            if (std::abs(apart.dot(here.normal)) > 2 * step * static_cast<float>(reach)) continue;
+            const float w =
+                like * like *
+                std::exp(-1.2f * static_cast<float>(dx * dx + dy * dy) / static_cast<float>(reach * reach));
+            weight += w;
+            open += w * other.open;
+            lit += w * other.lit;
+        }
+    return weight > 0 ? std::pair(open / weight, lit / weight) : std::pair(here.open, here.lit);
+}
+
+/// Whether the surface ends here before something clearly farther.
+bool on_outline(const Tile& tile, int x, int y, int reach) {
+    const Sample& here = tile.at(x, y);
+    for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx) {
+            const Sample& other = tile.at(x + dx, y + dy);
+            if (!other.hit || other.depth < here.depth - 0.06f) return true;
+        }
+    return false;
+}
+
+Vec3f shade(const Scene& scene, const Camera& camera, const Sample& s, float open, float lit) {
+    const Vec3f& n = s.normal;
+    const float key = std::max(0.0f, (n.dot(key_light) + 0.2f) / 1.2f) * lit;
+    const float fill = std::max(0.0f, n.dot(fill_light));
+    const float sky = (0.8f + 0.2f * n.y()) * std::pow(open, 1.3f);
+    const Vec3f half = (key_light + Vec3f::UnitZ()).normalized();
+    const float gloss = 0.10f * std::pow(std::max(0.0f, n.dot(half)), 28.0f) * lit;
+    const Vec3f light =
+        s.base * (0.95f * key + (0.16f * fill + 0.36f * sky) * (0.3f + 0.7f * open)) + Vec3f::Constant(gloss);
+    const float depth = camera.near > camera.far ? (camera.near - s.depth) / (camera.near - camera.far) : 0;
+    const float fade = 0.18f * std::clamp(depth, 0.0f, 1.0f);
+    return light * (1 - fade) + linear(scene.options.background) * fade;
+}
+
+/// One tile of a panel, in pixels of the panel.
+void draw_tile(Image& image, const Scene& scene, const Camera& camera, const Panel& panel, int x0, int y0,
+               int x1, int y1) {
+    const int grid = scene.grid, reach = grid + 1;
+    Tile tile{(x1 - x0) * grid + 2 * reach, (y1 - y0) * grid + 2 * reach, {}};
+    tile.samples.reserve(static_cast<std::size_t>(tile.columns) * static_cast<std::size_t>(tile.rows));
+    for (int y = 0; y < tile.rows; ++y)
+        for (int x = 0; x < tile.columns; ++x)
+            tile.samples.push_back(trace(scene, camera, x0 * grid + x - reach, y0 * grid + y - reach));
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x) {
+            Vec3f sum = Vec3f::Zero();
+            int hits = 0;
+            for (int k = 0; k < grid * grid; ++k) {
+                const int sx = (x - x0) * grid + k % grid + reach, sy = (y - y0) * grid + k / grid + reach;
+                const Sample& sample = tile.at(sx, sy);
+                if (!sample.hit) continue;
+                const auto [open, lit] = smooth_light(tile, sx, sy, reach, camera.step);
+                Vec3f colour = shade(scene, camera, sample, open, lit);
+                if (scene.options.outline && on_outline(tile, sx, sy, std::max(1, grid / 2))) colour *= 0.3f;
+                sum += colour.cwiseMin(1.0f);
+                ++hits;
+            }
+            if (hits == 0) continue;  // the background keeps its exact bytes
+            const float all = static_cast<float>(grid * grid);
+            const Vec3f mean =
+                (sum + linear(scene.options.background) * (all - static_cast<float>(hits))) / all;
+            image.set(panel.x + x, panel.y + y, mean.unaryExpr(&linear_to_srgb));
+        }
+}
+
+void draw_panel(Image& image, const Scene& scene, const Layout& layout, const Panel& panel,
+                const ViewBox& box, const Progress& progress) {
+    const double unit = scene.model.radius, pixel = 1 / layout.pixels_per_A;
+    Camera camera;
+    camera.axes.col(0) = panel.view.right.cast<float>();
+    camera.axes.col(1) = panel.view.up.cast<float>();
+    camera.axes.col(2) = panel.view.towards.cast<float>();
+    camera.left = static_cast<float>((panel.middle.x() - 0.5 * panel.width * pixel) / unit);
+    camera.top = static_cast<float>((panel.middle.y() + 0.5 * panel.height * pixel) / unit);
+    camera.step = static_cast<float>(pixel / unit / scene.grid);
+    camera.near = static_cast<float>(box.high.z() / unit);
+    camera.far = static_cast<float>(box.low.z() / unit);
+    constexpr int side = 48;
+    const int across = (panel.width + side - 1) / side, down = (panel.height + side - 1) / side;
+    const auto tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+    std::atomic<std::size_t> done = 0;
+    parallel_for(tiles, 1, [&](std::size_t i) {
+        const int x0 = static_cast<int>(i) % across * side, y0 = static_cast<int>(i) / across * side;
+        draw_tile(image, scene, camera, panel, x0, y0, std::min(x0 + side, panel.width),
+                  std::min(y0 + side, panel.height));
+        progress.report(static_cast<double>(++done) / static_cast<double>(tiles));
+    });
+}
+
+const MeshProperty* find_property(const TriMesh& mesh, const RenderOptions& options) {
+    if (!options.property) return nullptr;
+    const MeshProperty* found = mesh.find_vertex_property(*options.property);
+    if (found && found->components == 1) return found;
+    if (found)
+        throw InvalidInput(fmt::format("vertex property '{}' has {} components: colours need a scalar",
+                                       found->name, found->components));
+    std::string names;
+    for (const MeshProperty& p : mesh.vertex_properties) names += (names.empty() ? "" : ", ") + p.name;
+    throw InvalidInput(fmt::format("the mesh has no vertex property '{}'; it has {}", *options.property,
+                                   names.empty() ? "none" : names));
+}
+
+}  // namespace
+
+bool can_render() { return true; }
+
+Image render(const TriMesh& mesh, const RenderOptions& options, const Progress& progress) {
+    options.check();
+    if (mesh.empty()) throw InvalidInput("the mesh has no faces: there is nothing to see");
+    check(mesh, "render");
+    const MeshProperty* property = find_property(mesh, options);
+    std::optional<ColourScale> scale;
+    if (property) scale = choose_scale(property->values, options);
+
+    const Model model = make_model(mesh);
+    const std::vector<View> views = find_views(options.view);
+    std::vector<ViewBox> boxes;
+    for (const View& view : views) boxes.push_back(box_in_view(model, view));
+    const Layout layout = arrange(views, boxes, options);
+    Image image(layout.width, layout.height, options.background);
+
+    progress.report(0);
+    const RayCaster rays(model);
+    const int grid = static_cast<int>(std::lround(std::sqrt(options.samples)));
+    const Scene scene{model, rays, options, property, scale, grid};
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const double n = static_cast<double>(views.size()), k = static_cast<double>(i);
+        draw_panel(image, scene, layout, layout.panels[i], boxes[i], progress.part(k / n, (k + 1) / n));
+    }
+    draw_decorations(image, layout, options, scale);
+    return image;
+}
+
+#endif
+
+}  // namespace vdbgeo

@@ -1,0 +1,70 @@
+// Pictures of triangle meshes without a display.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/core/tri_mesh.h"
+#include "vdbgeo/view/image.h"
+
+namespace vdbgeo {
+
+struct RenderOptions {
+    int width = 1600;           ///< pixels, 64…Image::max_side
+    std::optional<int> height;  ///< pixels; unset: what the views need at this width, at most the width
+    /// "front" (seen along +y: x to the right, z up), "side" (seen along −x: y right, z up), "top" (seen
+    /// along −z: x right, y up), "iso" (from the front, right and above), or "three": front, side and top
+    /// beside each other at one scale.
+    std::string view = "three";
+
+    std::optional<std::string> property;  ///< scalar vertex property to colour by; unset: one plain colour
+    std::optional<std::string> label;  ///< under the colour scale, with its unit; unset: the property's name
+    std::optional<double> range_min;   ///< value of the first colour; unset: 2nd percentile of the property
+    std::optional<double> range_max;   ///< value of the last colour; unset: 98th percentile
+    /// One of Colormap::names(); unset: "diverging" where the range has both signs, else "sequential". The
+    /// percentile range of a diverging map is made symmetric about 0. With "categorical" the values are
+    /// rounded to class numbers and the ranges have no meaning.
+    std::optional<std::string> colormap;
+
+    int samples = 4;         ///< antialiasing: 1, 4, 9 or 16 primary rays a pixel
+    int occlusion_rays = 8;  ///< rays of ambient occlusion for each of them, 0 (none)…1024
+    bool shadows = true;     ///< soft shadow of the key light
+    bool outline = true;  ///< dark lines where the surface hides a farther part of itself or the background
+
+    Vec3f surface{0.47f, 0.67f, 0.85f};  ///< sRGB, outside of the surface where no property colours it
+    Vec3f inside{0.86f, 0.62f, 0.36f};  ///< sRGB, inside: seen through a hole, or where faces are turned over
+    Vec3f background{1, 1, 1};          ///< sRGB
+
+    std::string title;        ///< above the picture; empty: none
+    bool scale_bar = true;    ///< a bar of round length in Å, nm or µm
+    bool axis_labels = true;  ///< the view's name and the directions of x, y, z under each view
+
+    /// Throws InvalidInput naming the first option out of its range.
+    void check() const;
+};
+
+/// Whether this build has a ray caster (embree). Without it `render` throws InvalidInput.
+bool can_render();
+
+/// A shaded picture of the mesh by orthographic ray casting: key light from the upper left of the viewer and
+/// a weak fill light, both fixed to the camera, ambient occlusion over half the mesh's radius
+/// (cosine-weighted, lengths falling off linearly), a soft shadow, area-weighted vertex normals, slight
+/// fading with depth. All views have the same scale. Occlusion and shadow are averaged over neighbouring
+/// samples on the same piece of surface, so that they show no noise.
+///
+/// Any triangle mesh will do: open, non-manifold, with zero-area faces; points no face uses are ignored. A
+/// back face shows in the colour `inside`, or in the darkened colour of its property. NaN property values are
+/// grey. The mesh is centred and scaled in double precision first: neither its size nor its distance from the
+/// origin matters beyond the precision of its float coordinates.
+///
+/// Same mesh and options → same bytes, for any number of threads.
+///
+/// Errors: InvalidInput for bad options, an empty or damaged mesh, a mesh whose points all coincide, an
+/// unknown or non-scalar property, a build without embree; Cancelled by the progress.
+///
+/// Cost: width · height · samples · (5 + occlusion_rays) rays where the surface is; 40 bytes a vertex and 80
+/// a face of memory besides the picture.
+Image render(const TriMesh& mesh, const RenderOptions& options = {}, const Progress& progress = {});
+
+}  // namespace vdbgeo

@@ -61,14 +61,27 @@ Frame frame_of_transform(const openvdb::math::Transform& transform) {
     return frame;
 }
 
+openvdb::math::Transform::Ptr transform_of(const Frame& frame) {
+    namespace vm = openvdb::math;
+    const Mat3d& axes = frame.axes;
+    if (axes.isDiagonal(0)) {  // the plainest map: exact, and open to very small voxels
+        const openvdb::Vec3d scale(axes(0, 0), axes(1, 1), axes(2, 2));
+        const openvdb::Vec3d shift(frame.origin.x(), frame.origin.y(), frame.origin.z());
+        if (scale[0] == scale[1] && scale[1] == scale[2])
+            return std::make_shared<vm::Transform>(vm::MapBase::Ptr(new vm::UniformScaleTranslateMap(scale[0], shift)));
+        return std::make_shared<vm::Transform>(vm::MapBase::Ptr(new vm::ScaleTranslateMap(scale, shift)));
+    }
+    vm::Mat4d m = vm::Mat4d::identity();  // row vectors: row a is the step along axis a
+    for (int a = 0; a < 3; ++a)
+        for (int c = 0; c < 3; ++c) m(a, c) = axes(c, a);
+    for (int c = 0; c < 3; ++c) m(3, c) = frame.origin[c];
+    return vm::Transform::createLinearTransform(m);
+}
+
 }  // namespace
 
 void store_frame(DensityMap& map) {
-    openvdb::math::Mat4d m = openvdb::math::Mat4d::identity();  // row vectors: row a is the step along axis a
-    for (int a = 0; a < 3; ++a)
-        for (int c = 0; c < 3; ++c) m(a, c) = map.frame.axes(c, a);
-    for (int c = 0; c < 3; ++c) m(3, c) = map.frame.origin[c];
-    map.grid->setTransform(openvdb::math::Transform::createLinearTransform(m));
+    map.grid->setTransform(transform_of(map.frame));
     if (map.frame.bounded())
         set(*map.grid, size_key, openvdb::Vec3i(map.frame.size.x(), map.frame.size.y(), map.frame.size.z()));
     else

@@ -26,7 +26,8 @@ constexpr const char* usage =
     "  --threads T         1\n"
     "  --repeat R          5 timed rounds\n"
     "  --only-active V     runs on the grid of the samples above V too\n"
-    "  --peer NAME         only this one: vdbgeo, vdbgeo-active, openvdb, openvdb-active, flying-edges, read\n"
+    "  --peer NAME         only this one: vdbgeo, vdbgeo-active, openvdb, openvdb-active, flying-edges, "
+    "read\n"
     "  --digest            prints a checksum of vdbgeo's mesh instead of timing\n";
 
 struct Arguments {
@@ -45,17 +46,28 @@ Arguments parse(int count, char** words) {
             if (++i == count) throw InvalidInput(word + " needs a value");
             return words[i];
         };
-        if (word == "--phantom") a.phantom = value();
-        else if (word == "--size") a.size = std::stoi(value());
-        else if (word == "--snr") a.snr = std::stod(value());
-        else if (word == "--iso") a.isovalue = std::stod(value());
-        else if (word == "--threads") a.threads = std::stoi(value());
-        else if (word == "--repeat") a.repeat = std::stoi(value());
-        else if (word == "--only-active") a.only_active = std::stof(value());
-        else if (word == "--peer") a.peer = value();
-        else if (word == "--digest") a.digest = true;
-        else if (word[0] != '-' && a.map.empty()) a.map = word;
-        else throw InvalidInput(fmt::format("unknown word '{}'\n{}", word, usage));
+        if (word == "--phantom")
+            a.phantom = value();
+        else if (word == "--size")
+            a.size = std::stoi(value());
+        else if (word == "--snr")
+            a.snr = std::stod(value());
+        else if (word == "--iso")
+            a.isovalue = std::stod(value());
+        else if (word == "--threads")
+            a.threads = std::stoi(value());
+        else if (word == "--repeat")
+            a.repeat = std::stoi(value());
+        else if (word == "--only-active")
+            a.only_active = std::stof(value());
+        else if (word == "--peer")
+            a.peer = value();
+        else if (word == "--digest")
+            a.digest = true;
+        else if (word[0] != '-' && a.map.empty())
+            a.map = word;
+        else
+            throw InvalidInput(fmt::format("unknown word '{}'\n{}", word, usage));
     }
     if (a.map.empty() == a.phantom.empty()) throw InvalidInput(usage);
     if (a.threads < 1 || a.repeat < 1) throw InvalidInput("--threads and --repeat begin at 1");
@@ -109,8 +121,8 @@ void print_digest(const DensityMap& map, double isovalue) {
 void run(const Arguments& args) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(args.threads));
-    const Source source = args.map.empty() ? phantom_source(args.phantom, args.size, args.snr)
-                                           : mrc_source(args.map);
+    const Source source =
+        args.map.empty() ? phantom_source(args.phantom, args.size, args.snr) : mrc_source(args.map);
     if (!args.isovalue && !source.isovalue) throw InvalidInput("a file needs --iso");
     const double isovalue = args.isovalue ? *args.isovalue : *source.isovalue;
     const auto wanted = [&](const char* name) { return args.peer.empty() || args.peer == name; };
@@ -128,11 +140,11 @@ void run(const Arguments& args) {
         if (!map) return;
         const auto [leaves, crossed] = count_leaves(*map, static_cast<float>(isovalue));
         if (wanted(("vdbgeo" + suffix).c_str()))
-            contenders.push_back(
-                {"vdbgeo" + suffix, [&map, isovalue] { return run_vdbgeo(*map, isovalue); }, leaves, crossed});
+            contenders.push_back({"vdbgeo" + suffix, [&map, isovalue] { return run_vdbgeo(*map, isovalue); },
+                                  leaves, crossed});
         if (wanted(("openvdb" + suffix).c_str()))
-            contenders.push_back(
-                {"openvdb" + suffix, [&map, isovalue] { return run_openvdb(*map, isovalue); }, leaves, crossed});
+            contenders.push_back({"openvdb" + suffix,
+                                  [&map, isovalue] { return run_openvdb(*map, isovalue); }, leaves, crossed});
     };
     add_grid(in.all, "");
     add_grid(in.active, "-active");

@@ -17,17 +17,20 @@ int edge_between(int a, int b) {
 }
 
 /// Corners of a face in the order that is counter-clockwise seen from outside the cell.
-std::array<int, 4> face_corners(int face) {
+constexpr std::array<int, 4> make_face_corners(int face) {
     const int axis = face / 2, side = face % 2, u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3;
     const int base = side << axis;
     if (side == 1) return {base, base + u, base + u + v, base + v};
     return {base, base + v, base + u + v, base + u};
 }
+constexpr std::array<std::array<int, 4>, faces> face_corners{make_face_corners(0), make_face_corners(1),
+                                                             make_face_corners(2), make_face_corners(3),
+                                                             make_face_corners(4), make_face_corners(5)};
 
 bool inside(int sign_case, int corner) { return sign_case >> corner & 1; }
 
 bool is_ambiguous(int sign_case, int face) {
-    const auto q = face_corners(face);
+    const auto& q = face_corners[face];
     return inside(sign_case, q[0]) == inside(sign_case, q[2]) &&
            inside(sign_case, q[1]) == inside(sign_case, q[3]) &&
            inside(sign_case, q[0]) != inside(sign_case, q[1]);
@@ -50,7 +53,7 @@ std::vector<Loop> trace_loops(int sign_case, int joined) {
     std::array<int, edges> next;
     next.fill(-1);
     for (int f = 0; f < faces; ++f) {
-        const auto q = face_corners(f);
+        const auto& q = face_corners[f];
         const bool swap = is_ambiguous(sign_case, f) && (joined >> f & 1);
         for (int k = 0; k < 4; ++k) {  // an inside run begins at q[k]
             if (inside(sign_case, q[(k + 3) % 4]) || !inside(sign_case, q[k])) continue;
@@ -393,11 +396,21 @@ const Pattern& simple_pattern(int sign_case) {
     return t.entries[t.first[sign_case]].separate;
 }
 
+const std::array<const Pattern*, 256>& fixed_patterns() {
+    static const auto instance = [] {
+        std::array<const Pattern*, 256> patterns{};
+        for (int c = 0; c < 256; ++c)
+            if (!depends_on_values(c)) patterns[c] = &simple_pattern(c);
+        return patterns;
+    }();
+    return instance;
+}
+
 const Pattern& pattern(int sign_case, const std::array<double, corners>& d) {
     const Tables& t = tables();
     int bits = 0;
     for (int k = 0; k < t.ambiguous_count[sign_case]; ++k) {
-        const auto q = face_corners(t.ambiguous[sign_case][k]);
+        const auto& q = face_corners[t.ambiguous[sign_case][k]];
         const double even = d[q[0]] * d[q[2]], odd = d[q[1]] * d[q[3]];
         const bool joined = inside(sign_case, q[0]) ? even >= odd : odd >= even;
         bits |= joined << k;

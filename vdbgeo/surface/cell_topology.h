@@ -35,6 +35,9 @@ struct Pattern {
 bool depends_on_values(int sign_case);
 const Pattern& simple_pattern(int sign_case);
 
+/// simple_pattern of every case, null where the pattern depends on the values: for inner loops.
+const std::array<const Pattern*, 256>& fixed_patterns();
+
 /// The pattern with the topology of the trilinear interpolant, for any case. `d` are the corner values minus
 /// the isovalue; corners with d ≥ 0 are inside. Ambiguous faces are told apart by the asymptotic decider
 /// (Nielson & Hamann 1991), which depends on the four values of the face alone, so that the two cells at a

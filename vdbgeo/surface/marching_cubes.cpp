@@ -31,23 +31,60 @@ constexpr BitCounts bit_counts;
 constexpr unsigned count_bits(unsigned byte) { return bit_counts.of[byte & 0xFF]; }
 
 /// The crossed grid edges whose lower end lies in one block, in the order of their vertices: by row (x, y),
-/// then axis, then z.
+/// then axis, then z. Filled by the thread that counts the block.
 struct BlockEdges {
-    std::array<std::array<std::uint8_t, 3>, leaf::rows> crossed{};  // bit z of [row][axis]
-    std::array<std::uint16_t, leaf::rows> row_first{};  // number of the row's first vertex in the block
-    std::uint16_t edge_vertices = 0;
-    std::uint16_t extra_vertices = 0;
-    std::uint32_t triangles = 0;
-    std::uint64_t first_vertex = 0, first_triangle = 0;
-
-    VertexId vertex(int x, int y, int z, int axis) const {
-        const auto row = static_cast<std::size_t>(leaf::row(x, y));
-        const auto& c = crossed[row];
-        unsigned number = row_first[row] + count_bits(c[static_cast<std::size_t>(axis)] & ((1u << z) - 1));
-        for (std::size_t a = 0; a < static_cast<std::size_t>(axis); ++a) number += count_bits(c[a]);
-        return static_cast<VertexId>(first_vertex + number);
-    }
+    std::array<std::array<std::uint8_t, 3>, leaf::rows> crossed;  // bit z of [row][axis]
+    std::array<std::uint16_t, leaf::rows> row_first;  // number of the row's first vertex in the block
+    std::uint16_t edge_vertices, extra_vertices;
+    std::uint32_t triangles;
+    std::uint64_t first_vertex, first_triangle;
 };
+
+/// The vertex numbers on all crossed edges that a block's cells touch, its own and its upper neighbours'.
+class VertexNumbers {
+ public:
+    /// Of the cell at (x, y, z): the vertex on its edge e is at [edge_place[e]].
+    const VertexId* cell(int x, int y, int z) const { return number_.data() + place(x, y, z, 0); }
+
+    static constexpr int place(int x, int y, int z, int axis) {
+        return ((x * BlockSamples::dim + y) * 3 + axis) * BlockSamples::dim + z;
+    }
+
+    /// Takes the edges of the block (side 0) or of an upper neighbour that lie in the block's cells.
+    void take(const BlockEdges& edges, int side) {
+        const int x0 = side & 1 ? dim : 0, y0 = side & 2 ? dim : 0;
+        const int nx = side & 1 ? 1 : dim, ny = side & 2 ? 1 : dim;
+        for (int x = 0; x < nx; ++x)
+            for (int y = 0; y < ny; ++y) {
+                const auto row = static_cast<std::size_t>(leaf::row(x, y));
+                auto next = static_cast<VertexId>(edges.first_vertex + edges.row_first[row]);
+                for (int a = 0; a < 3; ++a) {
+                    const unsigned crossed = edges.crossed[row][static_cast<std::size_t>(a)];
+                    VertexId* out = number_.data() + place(x0 + x, y0 + y, 0, a);
+                    if (side & 4) {
+                        if (crossed & 1) out[dim] = next;
+                        next += count_bits(crossed);
+                    } else {
+                        for (unsigned left = crossed; left; left &= left - 1)
+                            out[__builtin_ctz(left)] = next++;
+                    }
+                }
+            }
+    }
+
+ private:
+    std::array<VertexId, 3 * BlockSamples::dim * BlockSamples::dim * BlockSamples::dim> number_{};
+};
+
+constexpr std::array<int, cell::edges> make_edge_places() {
+    std::array<int, cell::edges> places{};
+    for (int e = 0; e < cell::edges; ++e) {
+        const int c = cell::lower_corner(e);
+        places[static_cast<std::size_t>(e)] = VertexNumbers::place(c & 1, c >> 1 & 1, c >> 2 & 1, e / 4);
+    }
+    return places;
+}
+constexpr std::array<int, cell::edges> edge_place = make_edge_places();
 
 /// Calls visit(x, y, z, sign case) for the block's cells that the surface crosses, in a fixed order.
 template <class Visit>
@@ -77,18 +114,17 @@ class Extraction {
           isovalue_(isovalue),
           progress_(progress),
           blocks_(map.grid->constTree(), map.frame, isovalue, progress.part(0, 0.2)),
-          edges_(blocks_.size()),
           hard_cells_((blocks_.size() + chunk - 1) / chunk) {}
 
     TriMesh run() {
-        for_each_chunk(0.2, 0.5,
-                       [this](std::size_t b, BlockSamples& samples, std::size_t) { count(b, samples); });
+        edges_.resize(blocks_.size());
+        for_each_chunk(0.2, 0.5, [this](std::size_t b, Workspace& work) { count(b, work.samples); });
         const auto [vertices, triangles] = number();
         mesh_.points.resize(vertices);
         mesh_.triangles.resize(triangles);
-        for_each_chunk(0.5, 1.0, [this](std::size_t b, BlockSamples& samples, std::size_t& hard) {
-            place_vertices(b, samples);
-            make_triangles(b, samples, hard);
+        for_each_chunk(0.5, 1.0, [this](std::size_t b, Workspace& work) {
+            place_vertices(b, work.samples);
+            make_triangles(b, work);
         });
         return std::move(mesh_);
     }
@@ -97,16 +133,22 @@ class Extraction {
     static constexpr std::size_t chunk = 32;  // blocks a task
     static constexpr double nearest = 1.0 / 1024;
 
+    /// What a task keeps from block to block.
+    struct Workspace {
+        BlockSamples samples;
+        VertexNumbers numbers;
+        std::size_t hard = 0;  // hard cells of the chunk so far
+    };
+
     template <class Body>
     void for_each_chunk(double from, double to, const Body& body) {
         const Progress progress = progress_.part(from, to);
         std::atomic<std::size_t> done{0};
         parallel_blocks(blocks_.size(), chunk, [&](std::size_t begin, std::size_t end) {
-            BlockSamples samples;
-            std::size_t hard = 0;
+            Workspace work;
             for (std::size_t b = begin; b < end; ++b) {
-                blocks_.load(b, samples);
-                body(b, samples, hard);
+                blocks_.load(b, work.samples);
+                body(b, work);
             }
             const std::size_t now = done += end - begin;
             if ((now / chunk) % 64 == 0)
@@ -144,6 +186,7 @@ class Extraction {
             for (int y = 0; y < dim; ++y) {
                 const auto row = static_cast<std::size_t>(leaf::row(x, y));
                 edges.row_first[row] = static_cast<std::uint16_t>(vertices);
+                edges.crossed[row] = {};
                 if (x >= n.x() || y >= n.y()) continue;
                 const auto at = [&](int i, int j) -> unsigned {
                     return s.inside[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
@@ -160,8 +203,8 @@ class Extraction {
         edges.edge_vertices = static_cast<std::uint16_t>(vertices);
         unsigned triangles = 0, extra = 0;
         for_each_crossed_cell(s, cells_in_box(n), [&](int x, int y, int z, int sign_case) {
-            const Pattern* p = &cell::simple_pattern(sign_case);
-            if (cell::depends_on_values(sign_case)) {
+            const Pattern* p = fixed_[static_cast<std::size_t>(sign_case)];
+            if (!p) {
                 p = &cell::pattern(sign_case, cell_values(s, x, y, z, isovalue_));
                 hard_cells_[b / chunk].push_back(p);
             }
@@ -217,14 +260,6 @@ class Extraction {
                 }
     }
 
-    /// Vertex on edge e of the cell at (x, y, z): its owner is the block of the edge's lower end.
-    VertexId vertex_on(const std::array<const BlockEdges*, 8>& around, int x, int y, int z, int e) const {
-        const int c = cell::lower_corner(e);
-        const int i = x + (c & 1), j = y + (c >> 1 & 1), k = z + (c >> 2 & 1);
-        const BlockEdges* owner = around[static_cast<std::size_t>((i >> 3) | (j >> 3) << 1 | (k >> 3) << 2)];
-        return owner->vertex(i & 7, j & 7, k & 7, e / 4);
-    }
-
     Vec3d crossing_on(const BlockSamples& s, int x, int y, int z, int e) const {
         const int c = cell::lower_corner(e), d = cell::upper_corner(e);
         const auto value = [&](int k) { return s.values[x + (k & 1)][y + (k >> 1 & 1)][z + (k >> 2 & 1)]; };
@@ -233,23 +268,21 @@ class Extraction {
         return place;
     }
 
-    void make_triangles(std::size_t b, const BlockSamples& s, std::size_t& hard) {
-        std::array<const BlockEdges*, 8> around;
+    void make_triangles(std::size_t b, Workspace& work) {
         for (int side = 0; side < 8; ++side) {
             const std::int64_t n = blocks_.neighbour(b, side);
-            around[static_cast<std::size_t>(side)] = n < 0 ? nullptr : &edges_[static_cast<std::size_t>(n)];
+            if (n >= 0) work.numbers.take(edges_[static_cast<std::size_t>(n)], side);
         }
         const BlockEdges& edges = edges_[b];
+        const BlockSamples& s = work.samples;
         Triangle* out = mesh_.triangles.data() + edges.first_triangle;
         std::uint64_t extra = edges.first_vertex + edges.edge_vertices;
         std::array<VertexId, cell::edges + cell::max_centres> id;
         for_each_crossed_cell(s, cells_in_box(samples_in_box(b)), [&](int x, int y, int z, int sign_case) {
-            const Pattern& p = cell::depends_on_values(sign_case) ? *hard_cells_[b / chunk][hard++]
-                                                                  : cell::simple_pattern(sign_case);
-            for (unsigned left = p.edge_mask; left; left &= left - 1) {
-                const int e = __builtin_ctz(left);
-                id[static_cast<std::size_t>(e)] = vertex_on(around, x, y, z, e);
-            }
+            const Pattern* fixed = fixed_[static_cast<std::size_t>(sign_case)];
+            const Pattern& p = fixed ? *fixed : *hard_cells_[b / chunk][work.hard++];
+            const VertexId* number = work.numbers.cell(x, y, z);
+            for (std::size_t e = 0; e < cell::edges; ++e) id[e] = number[edge_place[e]];
             for (std::size_t k = 0; k < p.centre_count; ++k) {
                 Vec3d sum = Vec3d::Zero();
                 for (unsigned left = p.centre_edges[k]; left; left &= left - 1)
@@ -266,7 +299,8 @@ class Extraction {
     const double isovalue_;
     const Progress progress_;
     const CrossingBlocks blocks_;
-    std::vector<BlockEdges> edges_;
+    const std::array<const Pattern*, 256>& fixed_ = cell::fixed_patterns();
+    Array<BlockEdges> edges_;
     std::vector<std::vector<const Pattern*>> hard_cells_;  // per chunk, in cell order
     TriMesh mesh_;
 };

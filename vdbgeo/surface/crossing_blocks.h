@@ -54,7 +54,7 @@ class CrossingBlocks {
         std::array<int, 8> upper{};  // this node and its upper neighbours, -1 outside all nodes
         std::array<std::uint8_t, 8> upper_state{};  // of those that are outside all nodes
         std::vector<std::uint8_t> state;            // per block
-        std::vector<const leaf::Leaf*> leaf;        // per block, null for a tile
+        std::vector<const float*> samples;          // per block, its leaf's values, null for a tile
         std::vector<std::int32_t> block;            // per block, its number or -1
     };
     struct Block {
@@ -75,6 +75,7 @@ class CrossingBlocks {
     void collect_nodes();
     void classify(Node& node) const;
     void find_blocks(std::size_t n, std::vector<Block>& out) const;
+    void prefetch(std::size_t b) const;
     void load_rows(const Block& block, int side, BlockSamples& out) const;
 
     const openvdb::FloatTree& tree_;

@@ -219,12 +219,14 @@ void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
         if (place < 2 ? s == cut[place + 1] : s == cut[0]) {
             const int before = ring + place, after = ring + (place + 1) % 3;
             place = (place + 1) % 3;
-            p.centre_edges[p.centre_count + place] = static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
             add(p, after, before, at_a());
             add(p, before, after, at_b());
         }
         const int from_a = at_a(), from_b = at_b();
         ++(band.along_a[s] ? i : j);
+        if (!direct)
+            p.centre_edges[p.centre_count + place] |=
+                static_cast<std::uint16_t>(1 << from_a | 1 << from_b | 1 << at_a() | 1 << at_b());
         if (band.along_a[s])
             add(p, from_a, at_a(), direct ? from_b : ring + place);
         else

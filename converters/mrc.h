@@ -1,6 +1,9 @@
 // MRC2014 / CCP4 maps: header, reader, writer, and the list of departures from the format.
 #pragma once
 
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/volume/density_map.h"
+
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -8,9 +11,6 @@
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "vdbgeo/core/progress.h"
-#include "vdbgeo/volume/density_map.h"
 
 namespace vdbgeo {
 
@@ -25,24 +25,28 @@ struct MrcHeader {
     std::array<float, 3> angles{90, 90, 90};             ///< 14–16: cell angles α, β, γ, degrees
     std::int32_t mapc = 1, mapr = 2, maps = 3;           ///< 17–19: axis of columns, rows, sections
     float dmin = 0, dmax = -1, dmean = -2;               ///< 20–22
-    std::int32_t ispg = 1;                               ///< 23: space group; 0 image stack, 401+ volume stack
-    std::int32_t nsymbt = 0;                             ///< 24: bytes of the extended header
-    std::int32_t lskflg = 0;                             ///< 25 of CCP4 files before MRC2014: skew matrix present
-    std::array<float, 9> skwmat{};                       ///< 26–34 of such files
-    std::array<float, 3> skwtrn{};                       ///< 35–37 of such files: translation, Å
-    std::array<char, 4> exttyp{};                        ///< 27: type of the extended header
-    std::int32_t nversion = 0;                           ///< 28: 20140 or 20141 for MRC2014
-    std::int32_t imod_stamp = 0, imod_flags = 0;         ///< 39, 40: IMOD's stamp 1146047817 and flags
-    std::array<float, 3> origin{};                       ///< 50–52, Å
-    std::array<char, 4> map{};                           ///< 53: "MAP "
-    std::array<unsigned char, 4> machst{};               ///< 54: machine stamp
-    float rms = -1;                                      ///< 55
-    std::int32_t nlabl = 0;                              ///< 56
-    std::vector<std::string> labels;                     ///< 57–256: trimmed text, at most ten
-    bool swapped = false;                                ///< the file's byte order is not this machine's
+    std::int32_t ispg = 1;                        ///< 23: space group; 0 image stack, 401+ volume stack
+    std::int32_t nsymbt = 0;                      ///< 24: bytes of the extended header
+    std::int32_t lskflg = 0;                      ///< 25 of CCP4 files before MRC2014: skew matrix present
+    std::array<float, 9> skwmat{};                ///< 26–34 of such files
+    std::array<float, 3> skwtrn{};                ///< 35–37 of such files: translation, Å
+    std::array<char, 4> exttyp{};                 ///< 27: type of the extended header
+    std::int32_t nversion = 0;                    ///< 28: 20140 or 20141 for MRC2014
+    std::int32_t imod_stamp = 0, imod_flags = 0;  ///< 39, 40: IMOD's stamp 1146047817 and flags
+    std::int32_t word41 = 0;                      ///< 41: 127 behind −128 in word 40 marks scaled bytes
+    std::array<float, 3> origin{};                ///< 50–52, Å
+    std::array<char, 4> map{};                    ///< 53: "MAP "
+    std::array<unsigned char, 4> machst{};        ///< 54: machine stamp
+    float rms = -1;                               ///< 55
+    std::int32_t nlabl = 0;                       ///< 56
+    std::vector<std::string> labels;              ///< 57–256: trimmed text, at most ten
+    bool swapped = false;                         ///< the file's byte order is not this machine's
 };
 
-/// Which header words give the world position of the first sample.
+/// Which header words give the world position of the first sample. ORIGIN is plausible where it is finite,
+/// not zero, and no further away than ten times the longest edge of the box; NSTART where it is not over ten
+/// times both the box and M. A file with ORIGIN at zero and LSKFLG 1 is a CCP4 file older than MRC2014 with a
+/// skew transformation, map = S·(world − t): its axes are turned by S⁻¹, and `automatic` adds t.
 enum class OriginRule {
     automatic,  ///< ORIGIN where it is set and plausible, else NSTART, else zero
     header,     ///< words 50–52
@@ -58,18 +62,25 @@ struct MrcReadOptions {
     OriginRule origin = OriginRule::automatic;  ///< which words give the origin
     Vec3d origin_A = Vec3d::Zero();             ///< for OriginRule::given, Å
     std::optional<Vec3d> voxel_size_A;          ///< overrides the header's cell; each positive, Å
-    int volume = 0;                             ///< which volume of a stack of volumes (ISPG 401 and up), from 0
+    int volume = 0;  ///< which volume of a stack of volumes (ISPG 401 and up), from 0
 
     void check() const;
 };
 
-/// Reads the sections of a map file in file order, as float, without ever holding more than is asked for.
+/// Reads the sections of a map file in file order, as float, without ever holding more than is asked for. The
+/// name "-" is standard input.
 ///
 /// Modes 0 (int8, or uint8), 1 (int16), 2 (float32), 6 (uint16), 12 (float16), 101 (4-bit); both byte orders;
-/// every axis permutation; gzip, bzip2 and zstd by content. Sizes are 64-bit and checked against the length of
-/// the file before anything is allocated. A file that is damaged, truncated, of another format or of a mode not
-/// supported is refused with InvalidInput: one line with the word, what was expected and what was found; a file
-/// that cannot be opened or read is an IoError.
+/// every axis permutation; gzip, bzip2 and zstd by content. Sizes are 64-bit and checked against the length
+/// of the file before anything is allocated. A file that is damaged, truncated, of another format or of a
+/// mode not supported is refused with InvalidInput: one line with the word, what was expected and what was
+/// found; a file that cannot be opened or read is an IoError.
+///
+/// Voxel size: cell over M, axis by axis, where that is sound; cell over the number of samples where M is not
+/// positive, or where M gives an axis over ten times the others and the samples do not; 1 Å where the cell is
+/// unset. A cell that is negative or not finite is refused unless `voxel_size_A` is given. Angles that make
+/// no cell read as 90°. Bytes marked as scaled (words 40 and 41 are −128 and 127) become (DMAX − DMIN)/255 ·
+/// (byte + 128) + DMIN. Each of these departures is in warnings().
 class MrcReader {
  public:
     explicit MrcReader(const std::filesystem::path& path, const MrcReadOptions& options = {});
@@ -84,8 +95,15 @@ class MrcReader {
     const std::array<int, 3>& order() const;
     /// The origin rule that was in effect: "header", "nstart", "zero", "given", "nstart+skwtrn", "skwtrn".
     const std::string& origin_rule() const;
-    /// What is odd about the file but was understood, one line each.
+    /// What is odd about the file but was understood, one line each. What can be seen only at the end of
+    /// compressed data is added when the last section was read.
     const std::vector<std::string>& warnings() const;
+    /// M along x, y, z as it was in effect: cell = sampling · voxel size.
+    const Vec3i& sampling() const;
+    /// "int8", "uint8", "int8 scaled", "int16", "uint16", "float16", "float32" or "uint4".
+    const std::string& value_type() const;
+    /// Volumes in the file: 1, or more where it is a stack of them.
+    int volumes() const;
 
     /// Sections not yet read (of the chosen volume).
     int sections_left() const;
@@ -96,6 +114,12 @@ class MrcReader {
     struct State;
     std::unique_ptr<State> state_;
 };
+
+/// Writes what a VDB file has to remember of the map file `file` into `meta`: mrc_file, mrc_mode (that
+/// write_mrc should use), mrc_value_type, mrc_axes ("1,2,3": of columns, rows, sections), mrc_origin_rule,
+/// mrc_voxel_size and mrc_sampling and mrc_size (along x, y, z), mrc_nstart (words 5–7), mrc_ispg, mrc_labels
+/// (one a line), and the header's own statistics mrc_dmin, mrc_dmax, mrc_dmean, mrc_rms.
+void store_mrc_metadata(openvdb::MetaMap& meta, const MrcReader& reader, const std::string& file);
 
 /// What departs from MRC2014 in a map file, one line each with the word's number; empty for a flawless file.
 /// Reads the data too, since the statistics in the header are compared with it. Errors as MrcReader.
@@ -112,8 +136,13 @@ struct MrcWriteOptions {
 /// axes the order of the file that the map came from (metadata mrc_axes), so that an unsparsified map gives
 /// back the same data bytes. The name's ending .gz, .bz2 or .zst is not honoured: the file is plain.
 /// A bounded frame gives the box, else the box is that of the active voxels and the origin moves with it.
-/// Cell, ORIGIN, NSTART, labels, machine stamp and recomputed statistics are set. In integer modes values must
-/// be whole numbers in range: InvalidInput otherwise (nothing is scaled silently).
+/// Cell, labels, space group, machine stamp and recomputed statistics are set. A map whose position came from
+/// NSTART gets it back there, as long as it still lies on whole steps; else the position goes into ORIGIN and
+/// NSTART is kept as it was. In integer modes values must be whole numbers in range, in mode 12 not beyond
+/// ±65504: InvalidInput otherwise (nothing is scaled silently). Axes that are turned against x, y, z beyond
+/// what cell angles express have no place in an MRC header: InvalidInput. Bytes that were read as unsigned
+/// are written so, under IMOD's stamp. The data is gone through twice, for the statistics and for the file,
+/// with eight sections in memory.
 void write_mrc(const DensityMap& map, const std::filesystem::path& path, const MrcWriteOptions& options = {},
                const Progress& progress = {});
 

@@ -18,6 +18,9 @@ namespace {
 constexpr std::uint64_t too_many = std::numeric_limits<std::uint64_t>::max();
 constexpr const char* axis_names = "XYZ";
 
+// An NSYMBT up to this size may be a promise that was not kept; beyond it is junk.
+constexpr std::uint64_t largest_absent_header = 1 << 24;
+
 std::uint64_t product(std::uint64_t a, std::uint64_t b) {
     std::uint64_t result = 0;
     return __builtin_mul_overflow(a, b, &result) ? too_many : result;
@@ -90,7 +93,8 @@ class Interpreter {
         const std::string size = fmt::format("{} x {} x {} samples of mode {}", h_.nx, h_.ny, h_.nz, h_.mode);
         out_.data_start = mrc_header_bytes + extended;
         out_.data_end = promised;
-        if (length && *length < promised && extended > 0 && *length == sum(mrc_header_bytes, data)) {
+        if (length && *length < promised && extended > 0 && extended <= largest_absent_header &&
+            *length == sum(mrc_header_bytes, data)) {
             warn(
                 "NSYMBT (word 24) promises an extended header of {} bytes that is not there; "
                 "the data starts at byte 1024",
@@ -235,7 +239,8 @@ class Interpreter {
     void warn_of_images() {
         const bool images = h_.ispg == 0 && h_.nz > 1 && h_.maps == 3 && h_.mz == 1 && out_.sampling[2] == 1;
         if (images)
-            warn("ISPG (word 23) 0 and MZ (word 10) 1 declare a stack of {} images, not a volume", h_.nz);
+            warn("the file is a stack of {} images, not a volume: ISPG (word 23) is 0 and MZ (word 10) is 1",
+                 h_.nz);
     }
 
     // Words 25-37 of CCP4 files before MRC2014: map = S (world - t).

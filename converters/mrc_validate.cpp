@@ -31,25 +31,6 @@ std::string hex(const unsigned char* bytes) {
     return fmt::format("{:02x} {:02x} {:02x} {:02x}", bytes[0], bytes[1], bytes[2], bytes[3]);
 }
 
-void check_cell(Lines& lines, const MrcHeader& h) {
-    const std::array<std::int32_t, 3> m{h.mx, h.my, h.mz};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const char axis = "XYZ"[a];
-        if (m[a] <= 0) say(lines, "word {}: M{} is {}, expected a positive number", 8 + a, axis, m[a]);
-        if (!(h.cell[a] > 0))
-            say(lines, "word {}: the cell along {} is {}, expected a length", 11 + a, axis, h.cell[a]);
-    }
-    if (!cell_directions({h.angles[0], h.angles[1], h.angles[2]}))
-        say(lines, "words 14-16: the cell angles {}, {}, {} make no cell", h.angles[0], h.angles[1],
-            h.angles[2]);
-    const bool stack = h.ispg >= 401 && h.ispg <= 630;
-    if (!stack && (h.ispg < 0 || h.ispg > 230))
-        say(lines, "word 23: ISPG is {}, expected 0-230 or 401-630", h.ispg);
-    if (stack && h.mz > 0 && h.nz % h.mz != 0)
-        say(lines, "word 10: MZ {} does not divide NZ {} in a stack of volumes (ISPG {})", h.mz, h.nz,
-            h.ispg);
-}
-
 void check_origin(Lines& lines, const MrcHeader& h) {
     for (std::size_t a = 0; a < 3; ++a)
         if (!std::isfinite(h.origin[a]))
@@ -95,16 +76,11 @@ void check_labels(Lines& lines, const MrcHeader& h, const MrcHeaderBytes& bytes)
     if (strange) say(lines, "words 57-256: the labels have characters that are not ASCII text");
 }
 
-// Gaps between header and data are the reader's business: it warns about them in one line each.
-Lines file_warnings(const MrcReader& reader) {
-    Lines lines;
-    for (const std::string& warning : reader.warnings())
-        for (const char* about : {"bytes follow the data", "NSYMBT", "are swapped", "declare a stack",
-                                  "samples along", "mark the bytes"})
-            if (warning.find(about) != std::string::npos) {
-                lines.push_back(warning);
-                break;
-            }
+// What the reader finds odd departs from the format, but a stack is only worth knowing.
+Lines departures(const MrcReader& reader) {
+    Lines lines = reader.warnings();
+    const auto is_note = [](const std::string& line) { return line.find("the file is a stack of") == 0; };
+    lines.erase(std::remove_if(lines.begin(), lines.end(), is_note), lines.end());
     return lines;
 }
 
@@ -122,8 +98,8 @@ Statistics measure(const std::filesystem::path& path, const MrcReadOptions& opti
         reader.read_sections(values.data(), count);
         running.add(values.data(), values.size());
     }
-    const Lines warnings = file_warnings(reader);
-    if (options.volume == 0) lines.insert(lines.end(), warnings.begin(), warnings.end());
+    // The file's length is seen from its last volume, and all else from any.
+    if (options.volume == reader.volumes() - 1) lines = departures(reader);
     return running.result();
 }
 
@@ -160,7 +136,6 @@ std::vector<std::string> validate_mrc(const std::filesystem::path& path) {
         h = reader.header();
         volumes = reader.volumes();
     }
-    check_cell(lines, h);
     check_identity(lines, h);
     check_origin(lines, h);
     check_labels(lines, h, first_bytes(path));

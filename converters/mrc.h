@@ -122,7 +122,8 @@ class MrcReader {
 void store_mrc_metadata(openvdb::MetaMap& meta, const MrcReader& reader, const std::string& file);
 
 /// What departs from MRC2014 in a map file, one line each with the word's number; empty for a flawless file.
-/// Reads the data too, since the statistics in the header are compared with it. Errors as MrcReader.
+/// Reads the data too, since the statistics in the header are compared with it: opens the file more than
+/// once, so it cannot be a pipe. Errors as MrcReader.
 std::vector<std::string> validate_mrc(const std::filesystem::path& path);
 
 struct MrcWriteOptions {

@@ -5,8 +5,9 @@
 #include "vdbgeo/core/errors.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
-#include <cstdio>
+#include <thread>
 
 using namespace vdbgeo;
 using test::TempFolder;
@@ -129,4 +130,18 @@ TEST(ByteSource, MissingFilesAndFoldersAreIoErrors) {
     TempFolder folder;
     EXPECT_THROW(ByteSource::open(folder / "none"), IoError);
     EXPECT_THROW(ByteSource::open(folder.path()), IoError);
+}
+
+TEST(ByteSource, PipesAreReadWithoutKnowingTheirLength) {
+    TempFolder folder;
+    const std::string bytes = noise(300000), pipe = (folder / "pipe").string();
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    for (const std::string& sent : {bytes, test::gzip(bytes)}) {
+        std::thread writer([&] { write_bytes(pipe, sent); });
+        const auto source = ByteSource::open(pipe);
+        EXPECT_FALSE(source->length());
+        EXPECT_EQ(source->skip(100001), 100001u);
+        EXPECT_TRUE(read_all(*source, 70000) == bytes.substr(100001));
+        writer.join();
+    }
 }

@@ -18,7 +18,8 @@ DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, const Prog
     const Vec3i size = reader.frame().size;
     const auto order = reader.order();
     GridBuilder builder(size, order, sparsify);
-    const std::size_t section = static_cast<std::size_t>(size[order[0]]) * static_cast<std::size_t>(size[order[1]]);
+    const std::size_t section =
+        static_cast<std::size_t>(size[order[0]]) * static_cast<std::size_t>(size[order[1]]);
     const int total = reader.sections_left();
     Array<float> slab, next;
     const auto read = [&](Array<float>& into) {
@@ -80,8 +81,10 @@ std::string lower_case(std::string text) {
 void MapReadOptions::check() const {
     mrc.check();
     sparsify.check();
-    if (threshold_sigma && !std::isfinite(*threshold_sigma)) throw InvalidInput("the threshold is not a finite number");
-    if (threshold_sigma && sparsify.threshold) throw InvalidInput("two thresholds, one in sigma and one as a value");
+    if (threshold_sigma && !std::isfinite(*threshold_sigma))
+        throw InvalidInput("the threshold is not a finite number");
+    if (threshold_sigma && sparsify.threshold)
+        throw InvalidInput("two thresholds, one in sigma and one as a value");
 }
 
 MapFile read_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
@@ -110,7 +113,8 @@ Statistics mrc_statistics(const fs::path& path, const MrcReadOptions& options, c
 
 bool is_map_ending(const fs::path& path) {
     fs::path name = lower_case(path.filename().string());
-    if (name.extension() == ".gz" || name.extension() == ".bz2" || name.extension() == ".zst") name = name.stem();
+    if (name.extension() == ".gz" || name.extension() == ".bz2" || name.extension() == ".zst")
+        name = name.stem();
     for (const char* ending : {".mrc", ".map", ".ccp4", ".rec", ".st", ".mrcs", ".ali", ".preali", ".msk"})
         if (name.extension() == ending) return true;
     return false;

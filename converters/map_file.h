@@ -13,11 +13,13 @@
 namespace vdbgeo {
 
 struct MapReadOptions {
-    MrcReadOptions mrc;                ///< how to read an MRC or CCP4 file
-    SparsifyOptions sparsify;          ///< which samples to keep (of an MRC file; a VDB grid is taken as it is)
-    /// Keep samples above the mean plus this many rms instead of above a fixed value; the file is then read twice.
+    MrcReadOptions mrc;        ///< how to read an MRC or CCP4 file
+    SparsifyOptions sparsify;  ///< which samples to keep (of an MRC file; a VDB grid is taken as it is)
+    /// Keep samples above the mean plus this many rms instead of above a fixed value; the file is then read
+    /// twice.
     std::optional<double> threshold_sigma;
-    std::optional<std::string> grid;   ///< name of the grid in a VDB file; unset: "density", else the first of floats
+    std::optional<std::string>
+        grid;  ///< name of the grid in a VDB file; unset: "density", else the first of floats
 
     void check() const;
 };
@@ -28,10 +30,12 @@ struct MapFile {
     std::vector<std::string> warnings;  ///< what is odd about the file, one line each
 };
 
-/// Reads a map: VDB by its signature, else MRC or CCP4. MRC sections stream through GridBuilder, the next ones being
-/// read while the last are sorted into leaves: memory holds the kept leaves and two slabs. The grid's metadata tell
-/// where it came from (`mrc_*`, `vdbgeo_history`). Errors as MrcReader and read_vdb; Cancelled.
-MapFile read_map(const std::filesystem::path& path, const MapReadOptions& options = {}, const Progress& progress = {});
+/// Reads a map: VDB by its signature, else MRC or CCP4. MRC sections stream through GridBuilder, the next
+/// ones being read while the last are sorted into leaves: memory holds the kept leaves and two slabs. The
+/// grid's metadata tell where it came from (`mrc_*`, `vdbgeo_history`). Errors as MrcReader and read_vdb;
+/// Cancelled.
+MapFile read_map(const std::filesystem::path& path, const MapReadOptions& options = {},
+                 const Progress& progress = {});
 
 /// What the sections of a map file hold, gone through once: the statistics over all samples.
 Statistics mrc_statistics(const std::filesystem::path& path, const MrcReadOptions& options = {},

@@ -1,4 +1,5 @@
-// OpenVDB files: a writer that notices a full disk and compresses in parallel, a reader that looks before it loads.
+// OpenVDB files: a writer that notices a full disk and compresses in parallel, a reader that looks before it
+// loads.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -23,10 +24,10 @@ struct VdbWriteOptions {
     void check() const {}
 };
 
-/// Writes grids to a VDB file, whole or not at all (AtomicFile). The bytes are those that OpenVDB's own writer makes
-/// (but for the file's random identifier, which is derived from the grids' names and sizes here, so that equal input
-/// gives equal bytes); leaf buffers of float grids are compressed in parallel, a few MB in flight.
-/// Throws IoError; Cancelled.
+/// Writes grids to a VDB file, whole or not at all (AtomicFile). The bytes are those that OpenVDB's own
+/// writer makes (but for the file's random identifier, which is derived from the grids' names and sizes here,
+/// so that equal input gives equal bytes); leaf buffers of float grids are compressed in parallel, a few MB
+/// in flight. Throws IoError; Cancelled.
 void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std::filesystem::path& path,
                const VdbWriteOptions& options = {}, const Progress& progress = {});
 
@@ -41,13 +42,15 @@ bool is_vdb_file(const std::filesystem::path& path);
 
 /// The grids of a VDB file.
 ///
-/// Before OpenVDB loads anything the file's skeleton is walked: signature, version, every length and offset against
-/// the file's size, no missing tail; bounding boxes and voxel counts in the metadata must be plausible. Throws
-/// InvalidInput naming the fault and the grid, IoError where the file cannot be read.
+/// Before OpenVDB loads anything the file's skeleton is walked: signature, version, every length and offset
+/// against the file's size, no missing tail; bounding boxes and voxel counts in the metadata must be
+/// plausible. Throws InvalidInput naming the fault and the grid, IoError where the file cannot be read.
 std::vector<VdbGridInfo> list_vdb(const std::filesystem::path& path);
 
-/// Reads one grid of floats: the one called `name`; unset: "density", else the first grid of floats. Checked as by
-/// list_vdb, and the loaded tree against its metadata. Throws InvalidInput also where there is no such grid.
-openvdb::FloatGrid::Ptr read_vdb(const std::filesystem::path& path, const std::optional<std::string>& name = {});
+/// Reads one grid of floats: the one called `name`; unset: "density", else the first grid of floats. Checked
+/// as by list_vdb, and the loaded tree against its metadata. Throws InvalidInput also where there is no such
+/// grid.
+openvdb::FloatGrid::Ptr read_vdb(const std::filesystem::path& path,
+                                 const std::optional<std::string>& name = {});
 
 }  // namespace vdbgeo

@@ -31,13 +31,15 @@ class Skeleton {
         throw InvalidInput(fmt::format("{}: damaged VDB file: {} (byte {} of {})", name_, what, at_, size_));
     }
 
-    /// Walks the header, the file's metadata, and every grid's descriptor; the metadata of the grids comes back.
+    /// Walks the header, the file's metadata, and every grid's descriptor; the metadata of the grids comes
+    /// back.
     std::vector<VdbGridInfo> walk() {
         if (number<std::uint64_t>("signature") != openvdb::OPENVDB_MAGIC)
             throw InvalidInput(name_ + ": not a VDB file: it does not begin with the signature ' BDV'");
         const auto version = number<std::uint32_t>("file version");
         if (version < oldest_version || version > newest_version)
-            fail(fmt::format("file format version {}, {} to {} can be read", version, oldest_version, newest_version));
+            fail(fmt::format("file format version {}, {} to {} can be read", version, oldest_version,
+                             newest_version));
         number<std::uint32_t>("library version");
         number<std::uint32_t>("library version");
         const auto offsets = number<std::uint8_t>("offsets flag");
@@ -60,12 +62,15 @@ class Skeleton {
         info.name = info.name.substr(0, info.name.find('\x1e'));  // the writer's suffix for equal names
         info.type = string("type of grid '" + info.name + "'");
         const std::string parent = string("instance parent");
-        const auto grid_at = number<std::int64_t>("grid offset"), block_at = number<std::int64_t>("block offset"),
+        const auto grid_at = number<std::int64_t>("grid offset"),
+                   block_at = number<std::int64_t>("block offset"),
                    end_at = number<std::int64_t>("end offset");
         const auto here = static_cast<std::int64_t>(at_), end = static_cast<std::int64_t>(size_);
         if (grid_at != here || block_at < grid_at || end_at < block_at || end_at > end)
-            fail(fmt::format("grid '{}' claims bytes {} to {} with its voxels from {}: the file is cut off or its offsets "
-                             "are wrong", info.name, grid_at, end_at, block_at));
+            fail(fmt::format(
+                "grid '{}' claims bytes {} to {} with its voxels from {}: the file is cut off or its offsets "
+                "are wrong",
+                info.name, grid_at, end_at, block_at));
         number<std::uint32_t>("compression of grid '" + info.name + "'");
         info.metadata = metadata("grid '" + info.name + "'");
         if (at_ > static_cast<std::uint64_t>(end_at)) fail("the metadata runs beyond the end of its grid");
@@ -142,11 +147,13 @@ void check_noted_box(const std::string& file, const VdbGridInfo& grid) {
     for (int a = 0; a < 3; ++a) {
         const std::int64_t from = low->value()[a], to = high->value()[a];
         if (from > to)
-            throw InvalidInput(fmt::format("{}: grid '{}': its bounding box is empty or inverted along axis {}: {} to {}",
-                                           file, grid.name, "xyz"[a], from, to));
+            throw InvalidInput(
+                fmt::format("{}: grid '{}': its bounding box is empty or inverted along axis {}: {} to {}",
+                            file, grid.name, "xyz"[a], from, to));
         if (from < -furthest || to > furthest || to - from > furthest)
-            throw InvalidInput(fmt::format("{}: grid '{}': its bounding box is out of range along axis {}: {} to {}",
-                                           file, grid.name, "xyz"[a], from, to));
+            throw InvalidInput(
+                fmt::format("{}: grid '{}': its bounding box is out of range along axis {}: {} to {}", file,
+                            grid.name, "xyz"[a], from, to));
     }
 }
 
@@ -156,14 +163,17 @@ void check_loaded(const std::string& file, const openvdb::FloatGrid& grid) {
     const auto high = grid.getMetadata<openvdb::Vec3IMetadata>("file_bbox_max");
     if (!low || !high || (box.empty() && low->value() == high->value())) return;
     if (box.empty())
-        throw InvalidInput(fmt::format("{}: grid '{}' holds no voxel, though its metadata tells of a bounding box", file,
-                                       grid.getName()));
+        throw InvalidInput(
+            fmt::format("{}: grid '{}' holds no voxel, though its metadata tells of a bounding box", file,
+                        grid.getName()));
     if (low->value() != box.min().asVec3i() || high->value() != box.max().asVec3i())
-        throw InvalidInput(fmt::format("{}: grid '{}': its voxels do not fill the bounding box that its metadata tells of",
-                                       file, grid.getName()));
+        throw InvalidInput(
+            fmt::format("{}: grid '{}': its voxels do not fill the bounding box that its metadata tells of",
+                        file, grid.getName()));
 }
 
-std::string choose(const std::string& file, const std::vector<VdbGridInfo>& grids, const std::optional<std::string>& name) {
+std::string choose(const std::string& file, const std::vector<VdbGridInfo>& grids,
+                   const std::optional<std::string>& name) {
     const std::string float_type = openvdb::FloatGrid::gridType();
     const VdbGridInfo* chosen = nullptr;
     for (const VdbGridInfo& g : grids) {
@@ -175,7 +185,8 @@ std::string choose(const std::string& file, const std::vector<VdbGridInfo>& grid
     }
     if (chosen) return chosen->name;
     std::string names;
-    for (const VdbGridInfo& g : grids) names += fmt::format("{}'{}' ({})", names.empty() ? "" : ", ", g.name, g.type);
+    for (const VdbGridInfo& g : grids)
+        names += fmt::format("{}'{}' ({})", names.empty() ? "" : ", ", g.name, g.type);
     throw InvalidInput(name ? fmt::format("{}: no grid '{}' among {}", file, *name, names)
                             : fmt::format("{}: no grid of floats among {}", file, names));
 }
@@ -187,7 +198,8 @@ bool is_vdb_file(const fs::path& path) {
     if (!fs::is_regular_file(path, ignored)) return false;
     std::ifstream in(path, std::ios::binary);
     std::int64_t signature = 0;
-    return in.read(reinterpret_cast<char*>(&signature), 4) && (signature & 0xFFFFFFFF) == openvdb::OPENVDB_MAGIC;
+    return in.read(reinterpret_cast<char*>(&signature), 4) &&
+           (signature & 0xFFFFFFFF) == openvdb::OPENVDB_MAGIC;
 }
 
 std::vector<VdbGridInfo> list_vdb(const fs::path& path) {
@@ -201,12 +213,13 @@ openvdb::FloatGrid::Ptr read_vdb(const fs::path& path, const std::optional<std::
     try {
         openvdb::io::File file(path.string());
         file.setCopyMaxBytes(0);
-        file.open(false);  // no delayed loading: a fault shows now, not in the middle of a computation
+        file.open(false);     // no delayed loading: a fault shows now, not in the middle of a computation
         if (grids.empty()) {  // written to a pipe: everything is loaded by now
             for (auto it = file.beginName(); it != file.endName(); ++it)
                 grids.push_back({*it, file.readGridMetadata(*it)->type(), {}});
         }
-        auto grid = openvdb::GridBase::grid<openvdb::FloatGrid>(file.readGrid(choose(path.string(), grids, name)));
+        auto grid =
+            openvdb::GridBase::grid<openvdb::FloatGrid>(file.readGrid(choose(path.string(), grids, name)));
         if (!grid) throw InvalidInput(path.string() + ": the grid does not hold floats");
         check_loaded(path.string(), *grid);
         return grid;

@@ -57,8 +57,10 @@ class ParallelGrid : public FloatGrid {
         };
         tbb::parallel_pipeline(
             16, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, take) &
-                    tbb::make_filter<std::size_t, std::shared_ptr<std::string>>(tbb::filter_mode::parallel, serialise) &
-                    tbb::make_filter<std::shared_ptr<std::string>, void>(tbb::filter_mode::serial_in_order, write));
+                    tbb::make_filter<std::size_t, std::shared_ptr<std::string>>(tbb::filter_mode::parallel,
+                                                                                serialise) &
+                    tbb::make_filter<std::shared_ptr<std::string>, void>(tbb::filter_mode::serial_in_order,
+                                                                         write));
     }
 
  private:
@@ -73,18 +75,21 @@ class Writer : public openvdb::io::Archive {
     void write_to(std::ostream& os, const openvdb::GridCPtrVec& grids) const { write(os, grids, true, {}); }
 };
 
-/// The identifier in the header is random: another one every time. Readers only compare it with that of a file they
-/// have open, so a name-based one serves, and the same input gives the same bytes.
+/// The identifier in the header is random: another one every time. Readers only compare it with that of a
+/// file they have open, so a name-based one serves, and the same input gives the same bytes.
 void replace_identifier(std::ostream& os, const openvdb::GridCPtrVec& grids) {
     std::uint64_t hash[2] = {0xCBF29CE484222325ull, 0x9AE16A3B2F90404Full};
     for (const auto& grid : grids) {
-        const std::string text = fmt::format("{}:{}:{};", grid->getName(), grid->type(), grid->activeVoxelCount());
+        const std::string text =
+            fmt::format("{}:{}:{};", grid->getName(), grid->type(), grid->activeVoxelCount());
         for (const char c : text)
             for (auto& h : hash) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001B3ull + (h >> 29);
     }
-    const std::string id = fmt::format("{:08x}-{:04x}-4{:03x}-8{:03x}-{:012x}", hash[0] >> 32, hash[0] >> 16 & 0xFFFF,
-                                       hash[0] & 0xFFF, hash[1] >> 52, hash[1] & 0xFFFFFFFFFFFFull);
-    constexpr std::streamoff identifier_at = 8 + 4 + 8 + 1;  // signature, version, library version, offsets flag
+    const std::string id =
+        fmt::format("{:08x}-{:04x}-4{:03x}-8{:03x}-{:012x}", hash[0] >> 32, hash[0] >> 16 & 0xFFFF,
+                    hash[0] & 0xFFF, hash[1] >> 52, hash[1] & 0xFFFFFFFFFFFFull);
+    constexpr std::streamoff identifier_at =
+        8 + 4 + 8 + 1;  // signature, version, library version, offsets flag
     os.seekp(identifier_at);
     os.write(id.data(), static_cast<std::streamsize>(id.size()));
     os.seekp(0, std::ios::end);

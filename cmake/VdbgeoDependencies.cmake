@@ -20,8 +20,3 @@ find_package(ZLIB REQUIRED)
 find_package(BZip2 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(zstd CONFIG REQUIRED)
-
-if(VDBGEO_WITH_EMBREE)
-  find_package(embree 3 QUIET)
-  set(VDBGEO_EMBREE_FOUND ${embree_FOUND})
-endif()

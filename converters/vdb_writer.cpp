@@ -40,7 +40,11 @@ class ParallelGrid : public FloatGrid {
         };
         const auto serialise = [&](std::size_t begin) {
             std::ostringstream out(std::ios::binary);
-            openvdb::io::setStreamMetadataPtr(out, openvdb::io::getStreamMetadataPtr(os), false);
+            // A copy of what the stream knows: the setters below write into it.
+            const auto shared = openvdb::io::getStreamMetadataPtr(os);
+            auto known = std::make_shared<openvdb::io::StreamMetadata>();
+            if (shared) *known = *shared;
+            openvdb::io::setStreamMetadataPtr(out, known, false);
             openvdb::io::setDataCompression(out, openvdb::io::getDataCompression(os));
             openvdb::io::setGridClass(out, openvdb::io::getGridClass(os));
             const float background = constTree().background();

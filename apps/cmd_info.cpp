@@ -36,7 +36,7 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
     } else {
         j["kind"] = "map";
         // Statistics first: what is odd about compressed data shows only at its end.
-        const Statistics statistics = mrc_statistics(file, options.map.options.mrc, progress);
+        const Statistics statistics = mrc_statistics(file, options.map.options, progress);
         const MrcReader reader(file, options.map.options.mrc);
         j.update(mrc_json(reader, statistics, reader.warnings()));
         if (options.validate) j["departures"] = validate_mrc(file);

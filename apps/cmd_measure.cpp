@@ -37,7 +37,8 @@ Command measure_command() {
             "  vdbgeo measure groel.ply --json", [](CLI::App& app) {
                 auto o = std::make_shared<MeasureOptions>();
                 app.add_option("mesh", o->in, "Mesh: .ply .obj .off .stl")->required();
-                app.add_option("--histogram", o->histogram, "Write the histogram of the triangles' angles as a PNG here");
+                app.add_option("--histogram", o->histogram,
+                               "Write the histogram of the triangles' angles as a PNG here");
                 return [o](Session& session) { run_measure(*o, session); };
             }};
 }

@@ -57,7 +57,10 @@ Json surface_stage(Model& m, const Progress& progress) {
     const Isovalue rule = m.options.iso.parse();
     m.surface = extract_surface(m.options.in, m.map, rule, progress.part(0, 0.7));
     write_mesh(m.surface.mesh, m.out("surface.ply"), {}, progress.part(0.7, 1));
-    return {{"files", {"surface.ply"}}, {"method", "marching-cubes"}, {"iso", m.surface.isovalue}, {"iso_rule", rule.text()}};
+    return {{"files", {"surface.ply"}},
+            {"method", "marching-cubes"},
+            {"iso", m.surface.isovalue},
+            {"iso_rule", rule.text()}};
 }
 
 Json measure_stage(Model& m, const Progress& progress) {
@@ -72,7 +75,8 @@ Json measure_stage(Model& m, const Progress& progress) {
 Json picture_stage(Model& m, const Progress& progress) {
     RenderOptions options = m.options.render;
     if (options.title.empty())
-        options.title = fmt::format("{}, isovalue {:.4g}", fs::path(m.options.in).filename().string(), m.surface.isovalue);
+        options.title = fmt::format("{}, isovalue {:.4g}", fs::path(m.options.in).filename().string(),
+                                    m.surface.isovalue);
     write_png(render(m.surface.mesh, options, progress), m.out("surface.png"));
     return {{"files", {"surface.png"}}};
 }
@@ -113,8 +117,13 @@ void run_model(const ModelOptions& o, Session& session) {
             for (const std::string& w : model.map.warnings) session.warn(o.in + ": " + w);
     }
     Json summary{{"input", o.in},
-                 {"options", {{"iso", o.iso.text}, {"threshold", o.map.threshold}, {"origin", o.map.origin},
-                              {"voxel_size", o.map.voxel_size}, {"mode0", o.map.mode0}}},
+                 {"options",
+                  {{"iso", o.iso.text},
+                   {"threshold", o.map.threshold},
+                   {"origin", o.map.origin},
+                   {"voxel_size", o.map.voxel_size},
+                   {"mode0", o.map.mode0},
+                   {"invert", o.map.options.invert}}},
                  {"versions", versions_json()},
                  {"seconds", all.seconds()},
                  {"stages", stages}};
@@ -136,7 +145,8 @@ Command model_command() {
             "  vdbgeo model emd_1080.map -o groel --iso 0.8", [](CLI::App& app) {
                 auto o = std::make_shared<ModelOptions>();
                 app.add_option("map", o->in, "Map (MRC, CCP4) or VDB grid")->required();
-                app.add_option("-o,--out", o->folder, "Folder for the results; made where it is not there")->required();
+                app.add_option("-o,--out", o->folder, "Folder for the results; made where it is not there")
+                    ->required();
                 o->iso.add(app);
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);

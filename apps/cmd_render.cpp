@@ -32,7 +32,8 @@ void run_render(const RenderCommandOptions& o, Session& session) {
     const Image image = render(mesh, o.render, session.stage("rendering"));
     write_png(image, o.out);
     session.end_stage();
-    session.result({{"out", o.out}, {"width", image.width}, {"height", image.height}, {"seconds", clock.seconds()}});
+    session.result(
+        {{"out", o.out}, {"width", image.width}, {"height", image.height}, {"seconds", clock.seconds()}});
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+
 #include <functional>
 #include <string>
 #include <vector>
@@ -29,9 +30,9 @@ Command model_command();
 /// Every command, in the order of the help.
 std::vector<Command> all_commands();
 
-/// Runs `vdbgeo` with all commands, or, with `only` set, a program that is that one command under another name.
-/// Returns the exit code: 0 done, 2 usage, 3 bad input, 4 reading or writing failed, 5 the computation failed,
-/// 130 interrupted.
+/// Runs `vdbgeo` with all commands, or, with `only` set, a program that is that one command under another
+/// name. Returns the exit code: 0 done, 2 usage, 3 bad input, 4 reading or writing failed, 5 the computation
+/// failed, 130 interrupted.
 int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single);
 
 }  // namespace vdbgeo::app

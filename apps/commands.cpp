@@ -33,7 +33,8 @@ int guarded(const std::string& program, Session& session, const std::function<vo
     try {
         std::optional<tbb::global_control> limit;
         if (session.threads > 0)
-            limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(session.threads));
+            limit.emplace(tbb::global_control::max_allowed_parallelism,
+                          static_cast<std::size_t>(session.threads));
         openvdb::initialize();
         body(session);
         session.end_stage();
@@ -54,7 +55,8 @@ int guarded(const std::string& program, Session& session, const std::function<vo
         return fail(program, exit_interrupted, e.what());
     } catch (const std::bad_alloc&) {
         session.end_stage();
-        return fail(program, exit_computation, "out of memory; keep fewer voxels (--threshold) or use a smaller map");
+        return fail(program, exit_computation,
+                    "out of memory; keep fewer voxels (--threshold) or use a smaller map");
     } catch (const std::exception& e) {
         session.end_stage();
         return fail(program, exit_computation, e.what());
@@ -68,7 +70,8 @@ std::vector<Command> all_commands() {
             measure_command(), render_command(),  model_command()};
 }
 
-int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single) {
+int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program,
+        bool single) {
     install_interrupt_handler();
     CLI::App app(single ? commands[0].summary : "Geometric modelling of cryo-EM maps and tomograms", program);
     app.set_version_flag("--version", [] { return versions_text(); });
@@ -79,9 +82,10 @@ int run(int argc, char** argv, const std::vector<Command>& commands, const std::
         add_common_flags(app, session);
         chosen = commands[0].define(app);
     } else {
-        app.require_subcommand(1);
-        app.footer("vdbgeo COMMAND --help tells the flags of a command. Exit codes: 0 done, 2 usage, 3 bad input,\n"
-                   "4 reading or writing failed, 5 the computation failed, 130 interrupted.");
+        app.require_subcommand(0, 1);
+        app.footer(
+            "vdbgeo COMMAND --help tells the flags of a command. Exit codes: 0 done, 2 usage, 3 bad input,\n"
+            "4 reading or writing failed, 5 the computation failed, 130 interrupted.");
         for (const Command& command : commands) {
             CLI::App* sub = app.add_subcommand(command.name, command.summary);
             sub->footer("Example:\n" + command.example);
@@ -97,6 +101,8 @@ int run(int argc, char** argv, const std::vector<Command>& commands, const std::
     } catch (const CLI::ParseError& e) {
         return fail(program, exit_usage, fmt::format("{}; {} --help tells more", e.what(), program));
     }
+    if (!chosen)
+        return fail(program, exit_usage, fmt::format("a command is needed; {} --help lists them", program));
     return guarded(program, session, chosen);
 }
 

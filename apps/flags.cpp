@@ -28,29 +28,37 @@ std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
 
 void MapFlags::add_reading(CLI::App& app) {
     app.add_option("--voxel-size", voxel_size, "Voxel size in Å, one number or x,y,z; overrides the header");
-    app.add_option("--origin", origin, "World position of the first sample: auto, header, nstart, zero, or x,y,z in Å")
+    app.add_option("--origin", origin,
+                   "World position of the first sample: auto, header, nstart, zero, or x,y,z in Å")
         ->capture_default_str();
     app.add_option("--mode0", mode0, "Bytes of mode 0 maps: auto, signed or unsigned")
         ->check(CLI::IsMember({"auto", "signed", "unsigned"}))
         ->capture_default_str();
-    app.add_option("--volume", options.mrc.volume, "Which volume of a stack of volumes, from 0")->capture_default_str();
-    app.add_option("--grid", options.grid, "Name of the grid in a VDB file [density, else the first of floats]");
+    app.add_option("--volume", options.mrc.volume, "Which volume of a stack of volumes, from 0")
+        ->capture_default_str();
+    app.add_flag("--invert", options.invert,
+                 "Negate the samples: for raw tomograms, where what is dense is dark");
+    app.add_option("--grid", options.grid,
+                   "Name of the grid in a VDB file [density, else the first of floats]");
 }
 
 void MapFlags::add_sparsify(CLI::App& app) {
-    app.add_option("--threshold", threshold,
-                   "Keep samples above this density, in the map's units or as Nsigma (mean + N rms) [keep all]");
+    app.add_option(
+        "--threshold", threshold,
+        "Keep samples above this density, in the map's units or as Nsigma (mean + N rms) [keep all]");
     app.add_option("--band", options.sparsify.band,
                    "Keep samples within this distance of the threshold, in the map's units [no band]");
-    app.add_option("--background", options.sparsify.background,
-                   "Density of what was dropped, in the map's units [the solvent level: median at the border]");
+    app.add_option(
+        "--background", options.sparsify.background,
+        "Density of what was dropped, in the map's units [the solvent level: median at the border]");
 }
 
 void MapFlags::finish() {
     try {
         if (!threshold.empty()) {
             const Isovalue level = Isovalue::parse(threshold);
-            if (level.rule == Isovalue::Rule::automatic) throw UsageError("--threshold: a number or Nsigma is needed");
+            if (level.rule == Isovalue::Rule::automatic)
+                throw UsageError("--threshold: a number or Nsigma is needed");
             if (level.rule == Isovalue::Rule::sigma)
                 options.threshold_sigma = level.number;
             else
@@ -59,7 +67,8 @@ void MapFlags::finish() {
         if (!voxel_size.empty()) {
             options.mrc.voxel_size_A = parse_triple(voxel_size, true);
             if (!options.mrc.voxel_size_A)
-                throw UsageError(fmt::format("--voxel-size: '{}' is not a number of Å, nor three", voxel_size));
+                throw UsageError(
+                    fmt::format("--voxel-size: '{}' is not a number of Å, nor three", voxel_size));
         }
         if (mode0 == "signed") options.mrc.mode0 = MrcReadOptions::Mode0::as_signed;
         if (mode0 == "unsigned") options.mrc.mode0 = MrcReadOptions::Mode0::as_unsigned;
@@ -71,7 +80,9 @@ void MapFlags::finish() {
             options.mrc.origin = OriginRule::zero;
         } else if (origin != "auto") {
             const auto place = parse_triple(origin, false);
-            if (!place) throw UsageError(fmt::format("--origin: '{}' is none of auto, header, nstart, zero, x,y,z", origin));
+            if (!place)
+                throw UsageError(
+                    fmt::format("--origin: '{}' is none of auto, header, nstart, zero, x,y,z", origin));
             options.mrc.origin = OriginRule::given;
             options.mrc.origin_A = *place;
         }
@@ -83,7 +94,8 @@ void MapFlags::finish() {
 
 void IsoFlag::add(CLI::App& app) {
     app.add_option("--iso", text,
-                   "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a level set)")
+                   "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a "
+                   "level set)")
         ->capture_default_str();
 }
 
@@ -99,7 +111,8 @@ void add_vdb_flags(CLI::App& app, VdbWriteOptions& options) {
     using Compression = VdbWriteOptions::Compression;
     static const std::map<std::string, Compression> names{
         {"blosc", Compression::blosc}, {"zip", Compression::zip}, {"none", Compression::none}};
-    app.add_option("--compression", options.compression, "Compression of a VDB file: blosc, zip or none [blosc]")
+    app.add_option("--compression", options.compression,
+                   "Compression of a VDB file: blosc, zip or none [blosc]")
         ->transform(CLI::CheckedTransformer(names).description(""));
     app.add_flag("--half", options.half, "Store the values of a VDB file as 16-bit floats");
 }
@@ -109,12 +122,16 @@ void add_render_flags(CLI::App& app, RenderOptions& options) {
     app.add_option("--height", options.height, "Height of the picture in pixels [what the views need]");
     app.add_option("--view", options.view, "three, front, side, top or iso")->capture_default_str();
     app.add_option("--color-by", options.property, "Vertex property to colour by [plain colour]");
-    app.add_option("--color-label", options.label, "Text under the colour scale, with its unit [the property's name]");
+    app.add_option("--color-label", options.label,
+                   "Text under the colour scale, with its unit [the property's name]");
     app.add_option("--color-map", options.colormap, "sequential, diverging or categorical [by the range]");
-    app.add_option("--min", options.range_min, "Value of the first colour, in the property's unit [2nd percentile]");
-    app.add_option("--max", options.range_max, "Value of the last colour, in the property's unit [98th percentile]");
+    app.add_option("--min", options.range_min,
+                   "Value of the first colour, in the property's unit [2nd percentile]");
+    app.add_option("--max", options.range_max,
+                   "Value of the last colour, in the property's unit [98th percentile]");
     app.add_option("--samples", options.samples, "Rays a pixel: 1, 4, 9 or 16")->capture_default_str();
-    app.add_option("--occlusion", options.occlusion_rays, "Rays of ambient occlusion each, 0 to 1024")->capture_default_str();
+    app.add_option("--occlusion", options.occlusion_rays, "Rays of ambient occlusion each, 0 to 1024")
+        ->capture_default_str();
     app.add_option("--title", options.title, "Text above the picture [none]");
 }
 

@@ -1,9 +1,8 @@
 #include "apps/reports.h"
 
+#include <Eigen/Core>
 #include <fmt/format.h>
 #include <tbb/version.h>
-
-#include <Eigen/Core>
 
 #include "apps/build_info.h"
 
@@ -12,10 +11,14 @@ namespace {
 
 const char* class_name(openvdb::GridClass c) {
     switch (c) {
-        case openvdb::GRID_LEVEL_SET: return "level set";
-        case openvdb::GRID_FOG_VOLUME: return "fog volume";
-        case openvdb::GRID_STAGGERED: return "staggered";
-        default: return "unknown";
+        case openvdb::GRID_LEVEL_SET:
+            return "level set";
+        case openvdb::GRID_FOG_VOLUME:
+            return "fog volume";
+        case openvdb::GRID_STAGGERED:
+            return "staggered";
+        default:
+            return "unknown";
     }
 }
 
@@ -78,16 +81,21 @@ Json measures_json(const MeshMeasures& m) {
 
 std::vector<std::string> measures_text(const MeshMeasures& m) {
     std::vector<std::string> lines{
-        fmt::format("vertices    {}", m.vertices), fmt::format("faces       {}", m.faces),
+        fmt::format("vertices    {}", m.vertices),
+        fmt::format("faces       {}", m.faces),
         fmt::format("components  {}", m.components),
-        fmt::format("genus       {}", m.genus ? fmt::format("{}", *m.genus) : "told of closed manifolds only"),
-        fmt::format("closed      {}", m.closed ? "yes" : fmt::format("no, {} boundary edges", m.boundary_edges)),
+        fmt::format("genus       {}",
+                    m.genus ? fmt::format("{}", *m.genus) : "told of closed manifolds only"),
+        fmt::format("closed      {}",
+                    m.closed ? "yes" : fmt::format("no, {} boundary edges", m.boundary_edges)),
         fmt::format("area        {:.6g} Å²", m.area_A2),
-        fmt::format("volume      {}", m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "told of closed surfaces only"),
-        fmt::format("angles      {:.3g}° to {:.4g}°, mean {:.3g}°", m.min_angle_deg, m.max_angle_deg, m.mean_angle_deg)};
+        fmt::format("volume      {}",
+                    m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "told of closed surfaces only"),
+        fmt::format("angles      {:.3g}° to {:.4g}°, mean {:.3g}°", m.min_angle_deg, m.max_angle_deg,
+                    m.mean_angle_deg)};
     if (!m.manifold)
-        lines.push_back(fmt::format("not manifold: {} edges, {} vertices, {} degenerate faces", m.non_manifold_edges,
-                                    m.non_manifold_vertices, m.degenerate_faces));
+        lines.push_back(fmt::format("not manifold: {} edges, {} vertices, {} degenerate faces",
+                                    m.non_manifold_edges, m.non_manifold_vertices, m.degenerate_faces));
     if (!m.oriented) lines.push_back(fmt::format("not oriented: {} edges", m.misoriented_edges));
     return lines;
 }
@@ -128,7 +136,8 @@ Json grid_json(const DensityMap& map) {
     const openvdb::FloatGrid& grid = *map.grid;
     const Frame& f = map.frame;
     const auto box = grid.evalActiveVoxelBoundingBox();
-    const Vec3d extent = f.bounded() ? f.size.cast<double>() : Vec3d(box.dim().x(), box.dim().y(), box.dim().z());
+    const Vec3d extent =
+        f.bounded() ? f.size.cast<double>() : Vec3d(box.dim().x(), box.dim().y(), box.dim().z());
     Json j;
     j["name"] = grid.getName();
     j["active_voxels"] = grid.activeVoxelCount();
@@ -158,7 +167,8 @@ std::vector<std::string> as_lines(const Json& object) {
     std::vector<std::string> lines;
     for (const auto& [key, value] : object.items()) {
         if (value.is_array() && !value.empty() && value[0].is_string()) {
-            for (const auto& text : value) lines.push_back(fmt::format("{:<{}}  {}", key, width, text.get<std::string>()));
+            for (const auto& text : value)
+                lines.push_back(fmt::format("{:<{}}  {}", key, width, text.get<std::string>()));
         } else if (value.is_string()) {
             lines.push_back(fmt::format("{:<{}}  {}", key, width, value.get<std::string>()));
         } else if (!(value.is_array() && value.empty())) {

@@ -18,7 +18,8 @@ Json measures_json(const MeshMeasures& m);
 std::vector<std::string> measures_text(const MeshMeasures& m);
 
 /// Header, frame and statistics of an MRC or CCP4 file.
-Json mrc_json(const MrcReader& reader, const Statistics& statistics, const std::vector<std::string>& warnings);
+Json mrc_json(const MrcReader& reader, const Statistics& statistics,
+              const std::vector<std::string>& warnings);
 /// A grid in memory.
 Json grid_json(const DensityMap& map);
 

@@ -33,7 +33,8 @@ double Clock::lap() {
 /// Draws at most ten times a second, from whichever thread reports.
 class Session::Bar {
  public:
-    Bar(std::string name, bool quiet) : name_(std::move(name)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+    Bar(std::string name, bool quiet)
+        : name_(std::move(name)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
     bool report(double fraction) {
         if (interrupted) return false;
@@ -44,8 +45,9 @@ class Session::Bar {
         best_ = std::max(best_, fraction);
         const int width = 24, filled = static_cast<int>(best_ * width);
         const double left = best_ > 0.01 ? drawn_ * (1 - best_) / best_ : 0;
-        fmt::print(stderr, "\r{:<10} [{}{}] {:3.0f} %  {:.0f} %/s  {:.0f} s left \033[K", name_, std::string(filled, '#'),
-                   std::string(width - filled, '.'), 100 * best_, 100 * best_ / drawn_, left);
+        fmt::print(stderr, "\r{:<10} [{}{}] {:3.0f} %  {:.0f} %/s  {:.0f} s left \033[K", name_,
+                   std::string(filled, '#'), std::string(width - filled, '.'), 100 * best_,
+                   100 * best_ / drawn_, left);
         std::fflush(stderr);
         return true;
     }
@@ -54,7 +56,8 @@ class Session::Bar {
         if (quiet_ || ended_) return;
         ended_ = true;
         const std::lock_guard<std::mutex> lock(mutex_);
-        fmt::print(stderr, "{}{:<10} {:.2f} s{}\n", terminal_ ? "\r" : "", name_, clock_.seconds(), terminal_ ? "\033[K" : "");
+        fmt::print(stderr, "{}{:<10} {:.2f} s{}\n", terminal_ ? "\r" : "", name_, clock_.seconds(),
+                   terminal_ ? "\033[K" : "");
     }
 
  private:

@@ -1,9 +1,10 @@
 // What a run of a command shares: options for all commands, progress on the terminal, and what it prints.
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include <chrono>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -19,7 +19,8 @@ struct Surface {
 
 /// The surface of a map by marching cubes; of a level set (negative inside) with its faces turned outward.
 /// NumericalError where nothing crosses the isovalue, telling the map's range.
-Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule, const Progress& progress);
+Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
+                        const Progress& progress);
 
 /// A phantom as a map, with its noise or without.
 DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress);

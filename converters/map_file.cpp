@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Streams all sections of a reader through a builder; one slab is read while the one before is sorted in.
-DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, const Progress& progress) {
+DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, bool invert, const Progress& progress) {
     const Vec3i size = reader.frame().size;
     const auto order = reader.order();
     GridBuilder builder(size, order, sparsify);
@@ -24,9 +24,10 @@ DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, const Prog
     Array<float> slab, next;
     const auto read = [&](Array<float>& into) {
         const int count = std::min(GridBuilder::slab, reader.sections_left());
-        // A resize that grew with each section would copy; the memory is only touched as far as data arrives.
-        into.resize(section * static_cast<std::size_t>(count));
+        into.resize(section * static_cast<std::size_t>(count));  // touched only as far as data arrives
         if (count > 0) reader.read_sections(into.data(), count);
+        if (invert)
+            for (float& v : into) v = -v;
         return count;
     };
     int count = read(slab);
@@ -41,8 +42,9 @@ DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, const Prog
     return builder.finish(reader.frame());
 }
 
-std::string describe(const fs::path& path, const SparsifyOptions& s) {
+std::string describe(const fs::path& path, const SparsifyOptions& s, bool invert) {
     std::string line = "read " + path.filename().string();
+    if (invert) line += " inverted";
     if (s.threshold && s.band)
         line += fmt::format(" band {} about {}", *s.band, *s.threshold);
     else if (s.threshold)
@@ -55,19 +57,19 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
     SparsifyOptions sparsify = options.sparsify;
     double begin = 0;
     if (options.threshold_sigma) {
-        const Statistics s = mrc_statistics(path, options.mrc, progress.part(0, 0.5));
+        const Statistics s = mrc_statistics(path, options, progress.part(0, 0.5));
         sparsify.threshold = static_cast<float>(s.mean + *options.threshold_sigma * s.rms);
         begin = 0.5;
     }
     MrcReader reader(path, options.mrc);
     MapFile result;
-    result.map = stream(reader, sparsify, progress.part(begin, 1));
+    result.map = stream(reader, sparsify, options.invert, progress.part(begin, 1));
     result.warnings = reader.warnings();
     if (result.map.statistics.non_finite > 0)
         result.warnings.push_back(fmt::format("{} samples are not finite numbers; they count as empty",
                                               result.map.statistics.non_finite));
     store_mrc_metadata(*result.map.grid, reader, path.filename().string());
-    add_history(*result.map.grid, describe(path, sparsify));
+    add_history(*result.map.grid, describe(path, sparsify, options.invert));
     return result;
 }
 
@@ -98,17 +100,18 @@ MapFile read_map(const fs::path& path, const MapReadOptions& options, const Prog
         throw InvalidInput(fmt::format("{}: grid '{}': {}", path.string(), grid->getName(), e.what()));
     }
     result.level_set = grid->getGridClass() == openvdb::GRID_LEVEL_SET;
-    if (options.sparsify.threshold || options.threshold_sigma)
-        result.warnings.push_back("the grid of a VDB file is taken as it is: the threshold was not applied");
+    if (options.sparsify.threshold || options.threshold_sigma || options.invert)
+        result.warnings.push_back(
+            "the grid of a VDB file is taken as it is: neither threshold nor inversion was applied");
     progress.report(1);
     return result;
 }
 
-Statistics mrc_statistics(const fs::path& path, const MrcReadOptions& options, const Progress& progress) {
-    MrcReader reader(path, options);
+Statistics mrc_statistics(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
+    MrcReader reader(path, options.mrc);
     SparsifyOptions nothing;  // keeps no sample: only the statistics are wanted
     nothing.threshold = std::numeric_limits<float>::max();
-    return stream(reader, nothing, progress).statistics;
+    return stream(reader, nothing, options.invert, progress).statistics;
 }
 
 bool is_map_ending(const fs::path& path) {

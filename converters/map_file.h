@@ -18,6 +18,9 @@ struct MapReadOptions {
     /// Keep samples above the mean plus this many rms instead of above a fixed value; the file is then read
     /// twice.
     std::optional<double> threshold_sigma;
+    /// Negate the samples of an MRC file: in raw tomograms what is dense is dark. Thresholds and statistics
+    /// are then those of the negated values.
+    bool invert = false;
     std::optional<std::string>
         grid;  ///< name of the grid in a VDB file; unset: "density", else the first of floats
 
@@ -37,8 +40,9 @@ struct MapFile {
 MapFile read_map(const std::filesystem::path& path, const MapReadOptions& options = {},
                  const Progress& progress = {});
 
-/// What the sections of a map file hold, gone through once: the statistics over all samples.
-Statistics mrc_statistics(const std::filesystem::path& path, const MrcReadOptions& options = {},
+/// What the sections of a map file hold, gone through once: the statistics over all samples. Of the options
+/// those that choose samples to keep have no meaning.
+Statistics mrc_statistics(const std::filesystem::path& path, const MapReadOptions& options = {},
                           const Progress& progress = {});
 
 /// Endings that are taken for maps: .mrc .map .ccp4 .rec .st .mrcs and so on, each also with .gz, .bz2, .zst.

@@ -19,7 +19,8 @@ Isovalue Isovalue::parse(const std::string& text) {
         if (unit.empty()) return {Rule::value, number};
         if (unit == "sigma") return {Rule::sigma, number};
     }
-    throw InvalidInput(fmt::format("'{}' is not an isovalue: give a number, a number of sigmas such as 3sigma, or auto", text));
+    throw InvalidInput(fmt::format(
+        "'{}' is not an isovalue: give a number, a number of sigmas such as 3sigma, or auto", text));
 }
 
 std::string Isovalue::text() const {

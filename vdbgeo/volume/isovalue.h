@@ -7,7 +7,8 @@
 
 namespace vdbgeo {
 
-/// A level as a user gives it: a number in the map's units, or a rule that takes it from the map's statistics.
+/// A level as a user gives it: a number in the map's units, or a rule that takes it from the map's
+/// statistics.
 struct Isovalue {
     enum class Rule {
         automatic,  ///< 0 for a level set; else mean + 3 rms over all samples of the map

@@ -65,6 +65,45 @@ int class_of(int sign_case) {
     return smallest;
 }
 
+/// Values of f at the saddles of its restrictions to the six faces.
+std::vector<double> face_saddles(const Box<3>& f) {
+    std::vector<double> out;
+    for (int a = 0; a < 3; ++a)
+        for (int place = 0; place < 2; ++place) {
+            const Box<2> q = f.side(a, place);
+            const double twist = q.at(0) + q.at(3) - q.at(1) - q.at(2);
+            if (twist != 0) out.push_back((q.at(0) * q.at(3) - q.at(1) * q.at(2)) / twist);
+        }
+    return out;
+}
+
+/// Values of f at its critical points inside the cell. With the origin moved to where the mixed terms vanish
+/// f = h·xyz + px + qy + rz + s; there ∇f = 0 gives h·xyz = −px = −qy = −rz and (h·xyz)² = −pqr/h.
+std::vector<double> body_saddles(const Box<3>& box) {
+    double k[8];  // coefficient of the product of the coordinates whose bits are set
+    for (int c = 0; c < 8; ++c) k[c] = box.at(c);
+    for (int a = 0; a < 3; ++a)
+        for (int c = 0; c < 8; ++c)
+            if (c >> a & 1) k[c] -= k[c ^ 1 << a];
+    const double h = k[7], p = k[1] - k[3] * k[5] / h, q = k[2] - k[3] * k[6] / h, r = k[4] - k[5] * k[6] / h;
+    const double origin[3] = {-k[6] / h, -k[5] / h, -k[3] / h};
+    const double square = -p * q * r / h;
+    std::vector<double> out;
+    if (!(square > 0)) return out;
+    for (const double m : {std::sqrt(square), -std::sqrt(square)}) {
+        const double at[3] = {origin[0] - m / p, origin[1] - m / q, origin[2] - m / r};
+        if (*std::min_element(at, at + 3) <= 0 || *std::max_element(at, at + 3) >= 1) continue;
+        double f = 0;
+        for (int c = 0; c < 8; ++c) {
+            double term = k[c];
+            for (int a = 0; a < 3; ++a) term *= (c >> a & 1) ? at[a] : 1;
+            f += term;
+        }
+        out.push_back(f);
+    }
+    return out;
+}
+
 /// The surface of one cell in the oracle's terms, from the triangles.
 struct MeshedCell {
     Pieces<3> surface;
@@ -202,60 +241,66 @@ TEST(Topology, ClassesOfSignCases) {
     EXPECT_EQ(classes_with_tunnels().size(), 6u);
 }
 
-// Twin of the oracle: both phases counted on a fine grid. The surface is where they meet and their union is
-// the cell, so χ(inside) + χ(outside) − χ(surface) = 1.
-TEST(Topology, TheOracleAgreesWithDenseSampling) {
-    const auto phase = [](const Box<3>& box, int n, bool inside) {
-        std::vector<char> in(static_cast<std::size_t>((n + 1) * (n + 1) * (n + 1)));
-        const auto at = [n](int x, int y, int z) {
-            return static_cast<std::size_t>((z * (n + 1) + y) * (n + 1) + x);
-        };
-        for (int z = 0; z <= n; ++z)
-            for (int y = 0; y <= n; ++y)
-                for (int x = 0; x <= n; ++x) {
-                    double f = 0;
-                    const double t[3] = {double(x) / n, double(y) / n, double(z) / n};
-                    for (int c = 0; c < 8; ++c) {
-                        double w = box.at(c);
-                        for (int a = 0; a < 3; ++a) w *= (c >> a & 1) ? t[a] : 1 - t[a];
-                        f += w;
-                    }
-                    in[at(x, y, z)] = (f >= 0) == inside;
+namespace {
+
+/// χ of the level set from the samples of a fine grid. The surface is where inside and outside meet and their
+/// union is the cell, so χ(inside) + χ(outside) − χ(surface) = 1; a side's χ is that of all the grid's
+/// vertices, edges, squares and cubes that have no corner on the other side.
+int euler_by_dense_sampling(const Box<3>& box, int n) {
+    std::vector<int> cube(static_cast<std::size_t>((n + 1) * (n + 1) * (n + 1)));
+    const auto number = [n](int x, int y, int z) {
+        return static_cast<std::size_t>((z * (n + 1) + y) * (n + 1) + x);
+    };
+    for (int z = 0; z <= n; ++z)
+        for (int y = 0; y <= n; ++y)
+            for (int x = 0; x <= n; ++x) {
+                const double t[3] = {double(x) / n, double(y) / n, double(z) / n};
+                double f = 0;
+                for (int c = 0; c < 8; ++c) {
+                    double weight = box.at(c);
+                    for (int a = 0; a < 3; ++a) weight *= (c >> a & 1) ? t[a] : 1 - t[a];
+                    f += weight;
                 }
-        int euler = 0;  // of the vertices, edges, squares and cubes all of whose corners are in
-        for (int z = 0; z <= n; ++z)
-            for (int y = 0; y <= n; ++y)
-                for (int x = 0; x <= n; ++x)
-                    for (int span = 0; span < 8; ++span) {
-                        const int i = x + (span & 1), j = y + (span >> 1 & 1), k = z + (span >> 2 & 1);
-                        if (std::max({i, j, k}) > n) continue;
-                        bool all = true;
-                        for (int c = 0; c < 8; ++c)
-                            if ((c & ~span) == 0)
-                                all = all && in[at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1))];
-                        euler += all ? ((span == 1 || span == 2 || span == 4 || span == 7) ? -1 : 1) : 0;
-                    }
-        return euler;
-    };
-    const auto dense = [&](const Box<3>& box, int n) {
-        return phase(box, n, true) + phase(box, n, false) - 1;
-    };
+                cube[number(x, y, z)] = f >= 0;
+            }
+    int euler = -1;
+    for (int z = 0; z <= n; ++z)
+        for (int y = 0; y <= n; ++y)
+            for (int x = 0; x <= n; ++x)
+                for (int span = 0; span < 8; ++span) {  // the element from here along the axes in `span`
+                    if (x + (span & 1) > n || y + (span >> 1 & 1) > n || z + (span >> 2 & 1) > n) continue;
+                    bool same = true;
+                    for (int c = span; c; c = (c - 1) & span)
+                        same = same && cube[number(x, y, z)] ==
+                                           cube[number(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1))];
+                    if (same) euler += span == 1 || span == 2 || span == 4 || span == 7 ? -1 : 1;
+                }
+    return euler;
+}
+
+}  // namespace
+
+TEST(Topology, TheOracleAgreesWithDenseSampling) {
     Random random(11);
     int compared = 0, tunnels = 0;
-    for (int i = 0; i < 400; ++i) {
+    while (compared < 150 || tunnels < 20) {
         Box<3> box;
-        const int signs = i % 2 ? 0x69 : static_cast<int>(random() % 256);
-        for (int c = 0; c < 8; ++c)
-            box.value[static_cast<std::size_t>(c)] = (signs >> c & 1 ? 1 : -1) * magnitude(random, 1.2);
-        const int coarse = dense(box, 10), fine = dense(box, 20);
+        const int signs[] = {static_cast<int>(random() % 256), 0x69, 0x41 | 0x80, 0xC3};
+        for (std::size_t c = 0; c < 8; ++c)
+            box.value[c] = (signs[random() % 4] >> c & 1 ? 1 : -1) * magnitude(random, 1);
+        // Where the level is near a saddle the surface has necks too thin for the grid.
+        std::vector<double> saddles = face_saddles(box);
+        for (const double s : body_saddles(box)) saddles.push_back(s);
+        if (std::any_of(saddles.begin(), saddles.end(), [](double s) { return std::abs(s) < 0.06; }))
+            continue;
         const auto surface = level_set(box);
-        if (coarse != fine || !surface) continue;  // too coarse to tell
+        ASSERT_TRUE(surface);
+        const bool tunnel = surface->euler < surface->count();
+        if (!tunnel && compared >= 150) continue;
         ++compared;
-        tunnels += surface->euler < surface->count();
-        EXPECT_EQ(surface->euler, fine);
+        tunnels += tunnel;
+        EXPECT_EQ(surface->euler, euler_by_dense_sampling(box, 40));
     }
-    EXPECT_GT(compared, 300);
-    EXPECT_GT(tunnels, 5);
 }
 
 TEST(Topology, EverySignCaseWithRandomMagnitudes) {
@@ -273,7 +318,7 @@ TEST(Topology, EverySignCaseWithRandomMagnitudes) {
             if (HasFailure()) return;
         }
     EXPECT_LT(cells.undecided, cells.samples / 10000);
-    expect_tunnels(cells, 10);
+    expect_tunnels(cells, 5);
 }
 
 // The checkerboard (case 13) has six ambiguous faces, but not all 64 ways to resolve them exist: with p the
@@ -284,7 +329,7 @@ TEST(Topology, TheCheckerboardInAllItsResolutions) {
     Random random(2);
     CellComparison cells;
     std::map<int, int> resolutions;
-    for (int i = 0; i < 8000; ++i) {
+    for (int i = 0; i < 40000; ++i) {
         Corners values;
         const double bias = (i % 3 - 1) * 0.5;  // towards all joined and all parted
         for (std::size_t c = 0; c < 8; ++c) {
@@ -314,45 +359,6 @@ TEST(Topology, TheCheckerboardInAllItsResolutions) {
 }
 
 namespace {
-
-/// Values of f at the saddles of its restrictions to the six faces.
-std::vector<double> face_saddles(const Box<3>& f) {
-    std::vector<double> out;
-    for (int a = 0; a < 3; ++a)
-        for (int place = 0; place < 2; ++place) {
-            const Box<2> q = f.side(a, place);
-            const double twist = q.at(0) + q.at(3) - q.at(1) - q.at(2);
-            if (twist != 0) out.push_back((q.at(0) * q.at(3) - q.at(1) * q.at(2)) / twist);
-        }
-    return out;
-}
-
-/// Values of f at its critical points inside the cell. With the origin moved to where the mixed terms vanish
-/// f = h·xyz + px + qy + rz + s; there ∇f = 0 gives h·xyz = −px = −qy = −rz and (h·xyz)² = −pqr/h.
-std::vector<double> body_saddles(const Box<3>& box) {
-    double k[8];  // coefficient of the product of the coordinates whose bits are set
-    for (int c = 0; c < 8; ++c) k[c] = box.at(c);
-    for (int a = 0; a < 3; ++a)
-        for (int c = 0; c < 8; ++c)
-            if (c >> a & 1) k[c] -= k[c ^ 1 << a];
-    const double h = k[7], p = k[1] - k[3] * k[5] / h, q = k[2] - k[3] * k[6] / h, r = k[4] - k[5] * k[6] / h;
-    const double origin[3] = {-k[6] / h, -k[5] / h, -k[3] / h};
-    const double square = -p * q * r / h;
-    std::vector<double> out;
-    if (!(square > 0)) return out;
-    for (const double m : {std::sqrt(square), -std::sqrt(square)}) {
-        const double at[3] = {origin[0] - m / p, origin[1] - m / q, origin[2] - m / r};
-        if (*std::min_element(at, at + 3) <= 0 || *std::max_element(at, at + 3) >= 1) continue;
-        double f = 0;
-        for (int c = 0; c < 8; ++c) {
-            double term = k[c];
-            for (int a = 0; a < 3; ++a) term *= (c >> a & 1) ? at[a] : 1;
-            f += term;
-        }
-        out.push_back(f);
-    }
-    return out;
-}
 
 /// Compares cells whose level is within a relative 1e-2 … 1e-6 of a saddle, on both sides of it.
 void compare_beside_saddles(CellComparison& cells, Random& random,
@@ -441,6 +447,10 @@ void expect_manifold_inside(const TriMesh& mesh, const Vec3i& size) {
                     common = common || (p[a] == border && q[a] == border);
             in_border += common;
         }
+    std::vector<std::array<float, 3>> points;
+    for (const Vec3f& p : mesh.points) points.push_back({p.x(), p.y(), p.z()});
+    std::sort(points.begin(), points.end());
+    EXPECT_TRUE(std::adjacent_find(points.begin(), points.end()) == points.end()) << "coincident vertices";
     // As many as there are; an edge with one face inside, or one with two in the border, would tell.
     EXPECT_EQ(m.boundary_edges, in_border);
 }

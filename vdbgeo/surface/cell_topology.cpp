@@ -122,6 +122,7 @@ void add_disc(Pattern& p, const Loop& loop) {
             p.centre_edges[p.centre_count] |= static_cast<std::uint16_t>(1 << loop[i]);
             add(p, loop[i], loop[(i + 1) % n], centre);
         }
+        p.around_edges[p.centre_count] = p.centre_edges[p.centre_count];
         ++p.centre_count;
         return;
     }
@@ -202,7 +203,8 @@ std::array<int, 3> part_in_three(const Band& band) {
 }
 
 /// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross
-/// edges run over a ring of three extra vertices, each at the middle of a cross edge.
+/// edges run over a ring of three extra vertices, each midway between the middle of a cross edge (which may
+/// lie in a face of the cell, where the neighbour cell's may lie too) and the middle of the tunnel.
 void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
     const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
     Band band;
@@ -213,18 +215,25 @@ void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
     const auto at_a = [&] { return a[(band.start_a + i) % n]; };
     const auto at_b = [&] { return b[(band.start_b - j + 2 * m) % m]; };
     const std::array<int, 3> cut = direct ? std::array<int, 3>{-1, -1, -1} : part_in_three(band);
+    std::uint16_t around = 0;
+    for (const int e : a) around |= static_cast<std::uint16_t>(1 << e);
+    for (const int e : b) around |= static_cast<std::uint16_t>(1 << e);
     const int ring = edges + p.centre_count;
     int place = 2;  // the last ring vertex before the first cut
     for (int s = 0; s < steps; ++s) {
         if (place < 2 ? s == cut[place + 1] : s == cut[0]) {
             const int before = ring + place, after = ring + (place + 1) % 3;
             place = (place + 1) % 3;
-            p.centre_edges[p.centre_count + place] = static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
+            p.around_edges[p.centre_count + place] = around;
+            p.centre_edges[p.centre_count + place] |= static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
+            p.centre_edges[p.centre_count + (place + 2) % 3] |= static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
             add(p, after, before, at_a());
             add(p, before, after, at_b());
         }
         const int from_a = at_a(), from_b = at_b();
         ++(band.along_a[s] ? i : j);
+        if (!direct)
+            p.centre_edges[p.centre_count + place] |= static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
         if (band.along_a[s])
             add(p, from_a, at_a(), direct ? from_b : ring + place);
         else

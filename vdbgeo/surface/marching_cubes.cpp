@@ -233,6 +233,13 @@ class Extraction {
         return place;
     }
 
+    Vec3d mean_crossing(const BlockSamples& s, int x, int y, int z, unsigned edges) const {
+        Vec3d sum = Vec3d::Zero();
+        for (unsigned left = edges; left; left &= left - 1)
+            sum += crossing_on(s, x, y, z, __builtin_ctz(left));
+        return sum / __builtin_popcount(edges);
+    }
+
     void make_triangles(std::size_t b, const BlockSamples& s, std::size_t& hard) {
         std::array<const BlockEdges*, 8> around;
         for (int side = 0; side < 8; ++side) {
@@ -251,10 +258,9 @@ class Extraction {
                 id[static_cast<std::size_t>(e)] = vertex_on(around, x, y, z, e);
             }
             for (std::size_t k = 0; k < p.centre_count; ++k) {
-                Vec3d sum = Vec3d::Zero();
-                for (unsigned left = p.centre_edges[k]; left; left &= left - 1)
-                    sum += crossing_on(s, x, y, z, __builtin_ctz(left));
-                mesh_.points[extra] = world(blocks_.origin(b), sum / __builtin_popcount(p.centre_edges[k]));
+                const Vec3d place = 0.5 * (mean_crossing(s, x, y, z, p.centre_edges[k]) +
+                                           mean_crossing(s, x, y, z, p.around_edges[k]));
+                mesh_.points[extra] = world(blocks_.origin(b), place);
                 id[cell::edges + k] = static_cast<VertexId>(extra++);
             }
             for (std::size_t k = 0; k < p.triangle_count; ++k, ++out)

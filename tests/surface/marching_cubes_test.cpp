@@ -213,6 +213,17 @@ TEST(MarchingCubes, WhatLiesOutsideTheBoxDoesNotCount) {
     EXPECT_TRUE(same(alone, extract(map)));
 }
 
+TEST(MarchingCubes, RefusesIndicesThatItsNeighboursWouldOverflow) {
+    for (const int end : {std::numeric_limits<int>::max() - 5, std::numeric_limits<int>::min() + 5}) {
+        DensityMap map;
+        map.grid = openvdb::FloatGrid::create(0.0f);
+        map.grid->tree().setValue(openvdb::Coord(0, end, 0), 1.0f);
+        EXPECT_THROW(extract(map, 0.5), InvalidInput);
+        map.frame.size = Vec3i(10, 10, 10);  // in a box it does not count
+        EXPECT_TRUE(extract(map, 0.5).empty());
+    }
+}
+
 TEST(MarchingCubes, NegativeIndicesGiveTheSameSurface) {
     const int n = 20;
     const std::vector<float> values = noise(n * n * n, 10);

@@ -74,6 +74,7 @@ class Extraction {
  public:
     Extraction(const DensityMap& map, float isovalue, const Progress& progress)
         : frame_(map.frame),
+          mirrored_(map.frame.axes.determinant() < 0),
           isovalue_(isovalue),
           progress_(progress),
           blocks_(map.grid->constTree(), map.frame, isovalue, progress.part(0, 0.2)),
@@ -264,11 +265,12 @@ class Extraction {
                 id[cell::edges + k] = static_cast<VertexId>(extra++);
             }
             for (std::size_t k = 0; k < p.triangle_count; ++k, ++out)
-                for (std::size_t v = 0; v < 3; ++v) (*out)[v] = id[p.triangles[k][v]];
+                for (std::size_t v = 0; v < 3; ++v) (*out)[mirrored_ ? 2 - v : v] = id[p.triangles[k][v]];
         });
     }
 
     const Frame frame_;
+    const bool mirrored_;  // the frame turns triangles round
     const double isovalue_;
     const Progress progress_;
     const CrossingBlocks blocks_;
@@ -286,6 +288,7 @@ void MarchingCubesOptions::check() const {
 
 TriMesh marching_cubes(const DensityMap& map, const MarchingCubesOptions& options, const Progress& progress) {
     options.check();
+    if (map.frame.bounded() && map.frame.size.minCoeff() < 2) return {};  // no cells
     return Extraction(map, static_cast<float>(options.isovalue), progress).run();
 }
 

@@ -74,6 +74,7 @@ class Extraction {
  public:
     Extraction(const DensityMap& map, float isovalue, const Progress& progress)
         : frame_(map.frame),
+          mirrored_(map.frame.axes.determinant() < 0),
           isovalue_(isovalue),
           progress_(progress),
           blocks_(map.grid->constTree(), map.frame, isovalue, progress.part(0, 0.2)),
@@ -233,6 +234,13 @@ class Extraction {
         return place;
     }
 
+    Vec3d mean_crossing(const BlockSamples& s, int x, int y, int z, unsigned edges) const {
+        Vec3d sum = Vec3d::Zero();
+        for (unsigned left = edges; left; left &= left - 1)
+            sum += crossing_on(s, x, y, z, __builtin_ctz(left));
+        return sum / __builtin_popcount(edges);
+    }
+
     void make_triangles(std::size_t b, const BlockSamples& s, std::size_t& hard) {
         std::array<const BlockEdges*, 8> around;
         for (int side = 0; side < 8; ++side) {
@@ -251,18 +259,18 @@ class Extraction {
                 id[static_cast<std::size_t>(e)] = vertex_on(around, x, y, z, e);
             }
             for (std::size_t k = 0; k < p.centre_count; ++k) {
-                Vec3d sum = Vec3d::Zero();
-                for (unsigned left = p.centre_edges[k]; left; left &= left - 1)
-                    sum += crossing_on(s, x, y, z, __builtin_ctz(left));
-                mesh_.points[extra] = world(blocks_.origin(b), sum / __builtin_popcount(p.centre_edges[k]));
+                const Vec3d place = 0.5 * (mean_crossing(s, x, y, z, p.centre_edges[k]) +
+                                           mean_crossing(s, x, y, z, p.around_edges[k]));
+                mesh_.points[extra] = world(blocks_.origin(b), place);
                 id[cell::edges + k] = static_cast<VertexId>(extra++);
             }
             for (std::size_t k = 0; k < p.triangle_count; ++k, ++out)
-                for (std::size_t v = 0; v < 3; ++v) (*out)[v] = id[p.triangles[k][v]];
+                for (std::size_t v = 0; v < 3; ++v) (*out)[mirrored_ ? 2 - v : v] = id[p.triangles[k][v]];
         });
     }
 
     const Frame frame_;
+    const bool mirrored_;  // the frame turns triangles round
     const double isovalue_;
     const Progress progress_;
     const CrossingBlocks blocks_;
@@ -280,6 +288,7 @@ void MarchingCubesOptions::check() const {
 
 TriMesh marching_cubes(const DensityMap& map, const MarchingCubesOptions& options, const Progress& progress) {
     options.check();
+    if (map.frame.bounded() && map.frame.size.minCoeff() < 2) return {};  // no cells
     return Extraction(map, static_cast<float>(options.isovalue), progress).run();
 }
 

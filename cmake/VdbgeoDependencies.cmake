@@ -3,25 +3,18 @@
 # afterwards because it shadows the finders of other packages.
 include(CMakeFindDependencyMacro)
 
-macro(vdbgeo_find_openvdb)
-  set(_vdbgeo_module_path "${CMAKE_MODULE_PATH}")
-  set(_vdbgeo_shared "${BUILD_SHARED_LIBS}")
-  list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
-  find_package(OpenVDB 10.0 REQUIRED)
-  set(CMAKE_MODULE_PATH "${_vdbgeo_module_path}")
-  set(BUILD_SHARED_LIBS "${_vdbgeo_shared}")  # OpenVDB's module forces it on
-endmacro()
+find_dependency(TBB CONFIG COMPONENTS tbb tbbmalloc)
 
-find_package(TBB CONFIG REQUIRED COMPONENTS tbb tbbmalloc)
-vdbgeo_find_openvdb()
-find_package(Eigen3 3.3 CONFIG REQUIRED)
-find_package(fmt CONFIG REQUIRED)
-find_package(ZLIB REQUIRED)
-find_package(BZip2 REQUIRED)
-find_package(PNG REQUIRED)
-find_package(zstd CONFIG REQUIRED)
+set(_vdbgeo_module_path "${CMAKE_MODULE_PATH}")
+set(_vdbgeo_shared "${BUILD_SHARED_LIBS}")
+list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
+find_dependency(OpenVDB 10.0)
+set(CMAKE_MODULE_PATH "${_vdbgeo_module_path}")
+set(BUILD_SHARED_LIBS "${_vdbgeo_shared}")  # OpenVDB's module forces it on
 
-if(VDBGEO_WITH_EMBREE)
-  find_package(embree 3 QUIET)
-  set(VDBGEO_EMBREE_FOUND ${embree_FOUND})
-endif()
+find_dependency(Eigen3 3.3 CONFIG)
+find_dependency(fmt CONFIG)
+find_dependency(ZLIB)
+find_dependency(BZip2)
+find_dependency(PNG)
+find_dependency(zstd CONFIG)

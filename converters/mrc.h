@@ -33,6 +33,7 @@ struct MrcHeader {
     std::array<char, 4> exttyp{};                 ///< 27: type of the extended header
     std::int32_t nversion = 0;                    ///< 28: 20140 or 20141 for MRC2014
     std::int32_t imod_stamp = 0, imod_flags = 0;  ///< 39, 40: IMOD's stamp 1146047817 and flags
+    std::int32_t word41 = 0;                      ///< 41: 127 behind −128 in word 40 marks scaled bytes
     std::array<float, 3> origin{};                ///< 50–52, Å
     std::array<char, 4> map{};                    ///< 53: "MAP "
     std::array<unsigned char, 4> machst{};        ///< 54: machine stamp
@@ -42,7 +43,10 @@ struct MrcHeader {
     bool swapped = false;                         ///< the file's byte order is not this machine's
 };
 
-/// Which header words give the world position of the first sample.
+/// Which header words give the world position of the first sample. ORIGIN is plausible where it is finite,
+/// not zero, and no further away than ten times the longest edge of the box; NSTART where it is not over ten
+/// times both the box and M. A file with ORIGIN at zero and LSKFLG 1 is a CCP4 file older than MRC2014 with a
+/// skew transformation, map = S·(world − t): its axes are turned by S⁻¹, and `automatic` adds t.
 enum class OriginRule {
     automatic,  ///< ORIGIN where it is set and plausible, else NSTART, else zero
     header,     ///< words 50–52
@@ -63,13 +67,20 @@ struct MrcReadOptions {
     void check() const;
 };
 
-/// Reads the sections of a map file in file order, as float, without ever holding more than is asked for.
+/// Reads the sections of a map file in file order, as float, without ever holding more than is asked for. The
+/// name "-" is standard input.
 ///
 /// Modes 0 (int8, or uint8), 1 (int16), 2 (float32), 6 (uint16), 12 (float16), 101 (4-bit); both byte orders;
 /// every axis permutation; gzip, bzip2 and zstd by content. Sizes are 64-bit and checked against the length
 /// of the file before anything is allocated. A file that is damaged, truncated, of another format or of a
 /// mode not supported is refused with InvalidInput: one line with the word, what was expected and what was
 /// found; a file that cannot be opened or read is an IoError.
+///
+/// Voxel size: cell over M, axis by axis, where that is sound; cell over the number of samples where M is not
+/// positive, or where M gives an axis over ten times the others and the samples do not; 1 Å where the cell is
+/// unset. A cell that is negative or not finite is refused unless `voxel_size_A` is given. Angles that make
+/// no cell read as 90°. Bytes marked as scaled (words 40 and 41 are −128 and 127) become (DMAX − DMIN)/255 ·
+/// (byte + 128) + DMIN. Each of these departures is in warnings().
 class MrcReader {
  public:
     explicit MrcReader(const std::filesystem::path& path, const MrcReadOptions& options = {});
@@ -84,8 +95,15 @@ class MrcReader {
     const std::array<int, 3>& order() const;
     /// The origin rule that was in effect: "header", "nstart", "zero", "given", "nstart+skwtrn", "skwtrn".
     const std::string& origin_rule() const;
-    /// What is odd about the file but was understood, one line each.
+    /// What is odd about the file but was understood, one line each. What can be seen only at the end of
+    /// compressed data is added when the last section was read.
     const std::vector<std::string>& warnings() const;
+    /// M along x, y, z as it was in effect: cell = sampling · voxel size.
+    const Vec3i& sampling() const;
+    /// "int8", "uint8", "int8 scaled", "int16", "uint16", "float16", "float32" or "uint4".
+    const std::string& value_type() const;
+    /// Volumes in the file: 1, or more where it is a stack of them.
+    int volumes() const;
 
     /// Sections not yet read (of the chosen volume).
     int sections_left() const;
@@ -97,8 +115,15 @@ class MrcReader {
     std::unique_ptr<State> state_;
 };
 
+/// Writes what a VDB file has to remember of the map file `file` into `meta`: mrc_file, mrc_mode (that
+/// write_mrc should use), mrc_value_type, mrc_axes ("1,2,3": of columns, rows, sections), mrc_origin_rule,
+/// mrc_voxel_size and mrc_sampling and mrc_size (along x, y, z), mrc_nstart (words 5–7), mrc_ispg, mrc_labels
+/// (one a line), and the header's own statistics mrc_dmin, mrc_dmax, mrc_dmean, mrc_rms.
+void store_mrc_metadata(openvdb::MetaMap& meta, const MrcReader& reader, const std::string& file);
+
 /// What departs from MRC2014 in a map file, one line each with the word's number; empty for a flawless file.
-/// Reads the data too, since the statistics in the header are compared with it. Errors as MrcReader.
+/// Reads the data too, since the statistics in the header are compared with it: opens the file more than
+/// once, so it cannot be a pipe. Errors as MrcReader.
 std::vector<std::string> validate_mrc(const std::filesystem::path& path);
 
 struct MrcWriteOptions {
@@ -112,8 +137,13 @@ struct MrcWriteOptions {
 /// axes the order of the file that the map came from (metadata mrc_axes), so that an unsparsified map gives
 /// back the same data bytes. The name's ending .gz, .bz2 or .zst is not honoured: the file is plain.
 /// A bounded frame gives the box, else the box is that of the active voxels and the origin moves with it.
-/// Cell, ORIGIN, NSTART, labels, machine stamp and recomputed statistics are set. In integer modes values
-/// must be whole numbers in range: InvalidInput otherwise (nothing is scaled silently).
+/// Cell, labels, space group, machine stamp and recomputed statistics are set. A map whose position came from
+/// NSTART gets it back there, as long as it still lies on whole steps; else the position goes into ORIGIN and
+/// NSTART is kept as it was. In integer modes values must be whole numbers in range, in mode 12 not beyond
+/// ±65504: InvalidInput otherwise (nothing is scaled silently). Axes that are turned against x, y, z beyond
+/// what cell angles express have no place in an MRC header: InvalidInput. Bytes that were read as unsigned
+/// are written so, under IMOD's stamp. The data is gone through twice, for the statistics and for the file,
+/// with eight sections in memory.
 void write_mrc(const DensityMap& map, const std::filesystem::path& path, const MrcWriteOptions& options = {},
                const Progress& progress = {});
 

@@ -159,6 +159,107 @@ TEST(MarchingCubes, NotANumberCountsAsEmpty) {
     EXPECT_EQ(m.components, 1u);
 }
 
+TEST(MarchingCubes, NoiseWithValuesThatAreNotFiniteIsManifold) {
+    const int n = 24;
+    std::vector<float> values = noise(n * n * n, 6);
+    const float odd[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                         -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::max(),
+                         std::numeric_limits<float>::denorm_min()};
+    for (std::size_t i = 0; i < values.size(); i += 3) values[i] = odd[i / 3 % 5];
+    const TriMesh mesh = extract(map_from_values(Vec3i(n, n, n), values));
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_TRUE(m.manifold && m.oriented);
+    EXPECT_EQ(m.unused_vertices, 0u);
+    EXPECT_NO_THROW(check(mesh, "mesh"));  // every coordinate is finite
+}
+
+TEST(MarchingCubes, AMapOfOneLayerHasNoCellsAndAnEmptyMesh) {
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3i size(12, 12, 12);
+        size[axis] = 1;
+        const TriMesh mesh = extract(map_from_values(size, noise(144, 7)));
+        EXPECT_TRUE(mesh.triangles.empty());
+        EXPECT_TRUE(mesh.points.empty());
+    }
+}
+
+TEST(MarchingCubes, BoxesOfAnySizeMeetTheLeavesAnyhow) {
+    for (const Vec3i& size : {Vec3i(2, 8, 9), Vec3i(9, 2, 17), Vec3i(16, 9, 2), Vec3i(17, 8, 10),
+                              Vec3i(130, 3, 2), Vec3i(2, 129, 3), Vec3i(3, 2, 128)}) {
+        const auto count = static_cast<std::size_t>(size.x() * size.y() * size.z());
+        const MeshMeasures m = measure_mesh(extract(map_from_values(size, noise(count, 8))));
+        EXPECT_GT(m.faces, 0u);
+        EXPECT_TRUE(m.manifold && m.oriented);
+        EXPECT_EQ(m.unused_vertices, 0u);
+    }
+}
+
+TEST(MarchingCubes, WhatLiesOutsideTheBoxDoesNotCount) {
+    DensityMap map = map_from_values(Vec3i(21, 18, 13), noise(21 * 18 * 13, 9));
+    const TriMesh alone = extract(map);
+    auto access = map.grid->getAccessor();
+    for (int i = -30; i < 60; ++i) {
+        access.setValue(openvdb::Coord(-1, i, i), 5);
+        access.setValue(openvdb::Coord(21, i, i), 5);
+        access.setValue(openvdb::Coord(i, 18, 5), 5);
+        access.setValue(openvdb::Coord(i, i, -1), -5);
+        access.setValue(openvdb::Coord(i, 3, 13), 5);
+    }
+    map.grid->tree().addTile(1, openvdb::Coord(24, 0, 0), 7.0f, true);
+    map.grid->tree().addTile(2, openvdb::Coord(-128, 0, 0), 7.0f, true);
+    EXPECT_TRUE(same(alone, extract(map)));
+    map.grid->tree().addTile(3, openvdb::Coord(-4096, 0, 0), 7.0f, true);
+    map.grid->tree().addTile(3, openvdb::Coord(0, 4096, 0), 7.0f, true);
+    EXPECT_TRUE(same(alone, extract(map)));
+}
+
+TEST(MarchingCubes, RefusesIndicesThatItsNeighboursWouldOverflow) {
+    for (const int end : {std::numeric_limits<int>::max() - 5, std::numeric_limits<int>::min() + 5}) {
+        DensityMap map;
+        map.grid = openvdb::FloatGrid::create(0.0f);
+        map.grid->tree().setValue(openvdb::Coord(0, end, 0), 1.0f);
+        EXPECT_THROW(extract(map, 0.5), InvalidInput);
+        map.frame.size = Vec3i(10, 10, 10);  // in a box it does not count
+        EXPECT_TRUE(extract(map, 0.5).empty());
+    }
+}
+
+TEST(MarchingCubes, NegativeIndicesGiveTheSameSurface) {
+    const int n = 20;
+    const std::vector<float> values = noise(n * n * n, 10);
+    const auto extract_at = [&](const openvdb::Coord& first) {
+        DensityMap map;
+        map.grid = openvdb::FloatGrid::create(-1.0f);
+        map.frame.origin = -Vec3d(first.x(), first.y(), first.z());
+        for (int i = 0; i < n * n * n; ++i)
+            map.grid->tree().setValue(first.offsetBy(i % n, i / n % n, i / n / n),
+                                      values[static_cast<std::size_t>(i)]);
+        return measure_mesh(extract(map));
+    };
+    const MeshMeasures here = extract_at({0, 0, 0});
+    EXPECT_TRUE(here.closed && here.manifold);
+    for (const openvdb::Coord& first : {openvdb::Coord(-1, -1, -1), openvdb::Coord(-13, -8, -7),
+                                        openvdb::Coord(-4100, -130, -5), openvdb::Coord(4090, -20, 123)}) {
+        const MeshMeasures there = extract_at(first);
+        EXPECT_TRUE(there.closed && there.manifold);
+        EXPECT_EQ(there.vertices, here.vertices);
+        EXPECT_EQ(there.faces, here.faces);
+        EXPECT_EQ(there.euler_characteristic, here.euler_characteristic);
+        EXPECT_NEAR(there.area_A2, here.area_A2, 1e-4 * here.area_A2);
+    }
+}
+
+TEST(MarchingCubes, NormalsPointFromDenseToEmptyInAMirroredFrame) {
+    Frame frame = centred_frame(24, 0.1);
+    for (int axis = 0; axis < 3; ++axis) {
+        frame.axes.col(axis) *= -1;
+        frame.origin = frame.axes * Vec3d::Constant(-11.5);
+        const MeshMeasures m = measure_mesh(extract(map_from_function(Vec3i(24, 24, 24), frame, sphere)));
+        ASSERT_TRUE(m.volume_A3);
+        EXPECT_NEAR(*m.volume_A3, 4.0 / 3 * M_PI, 0.05) << "axes turned round: " << axis + 1;
+    }
+}
+
 TEST(MarchingCubes, NothingCrossedIsAnEmptyMesh) {
     EXPECT_TRUE(extract(sphere_map(0.2), 5).empty());
     DensityMap none;

@@ -102,6 +102,12 @@ void add(Pattern& p, int a, int b, int c) {
                                        static_cast<std::uint8_t>(c)};
 }
 
+std::uint16_t mask_of(const Loop& loop) {
+    std::uint16_t mask = 0;
+    for (const int e : loop) mask |= static_cast<std::uint16_t>(1 << e);
+    return mask;
+}
+
 /// Triangulates a disc bounded by the loop with the shortest allowed diagonals (dynamic programming over
 /// sub-polygons); where there are none, a fan about an extra vertex.
 void add_disc(Pattern& p, const Loop& loop) {
@@ -121,10 +127,8 @@ void add_disc(Pattern& p, const Loop& loop) {
         }
     if (cost[0][n - 1] >= forbidden) {
         const int centre = edges + p.centre_count;
-        for (int i = 0; i < n; ++i) {
-            p.centre_edges[p.centre_count] |= static_cast<std::uint16_t>(1 << loop[i]);
-            add(p, loop[i], loop[(i + 1) % n], centre);
-        }
+        for (int i = 0; i < n; ++i) add(p, loop[i], loop[(i + 1) % n], centre);
+        p.around_edges[p.centre_count] = p.centre_edges[p.centre_count] = mask_of(loop);
         ++p.centre_count;
         return;
     }
@@ -205,42 +209,50 @@ std::array<int, 3> part_in_three(const Band& band) {
 }
 
 /// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross
-/// edges run over a ring of three extra vertices, each at the middle of a cross edge.
+/// edges run over a ring of three extra vertices. Each is drawn from the middle of the crossings that it is
+/// joined to, all of which may lie in one face, towards the middle of the tunnel: a vertex in a face could
+/// meet another of the neighbour cell.
 void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
     const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
     Band band;
     const bool direct = find_band(a, b, diagonal_cost, band) < forbidden;
     if (!direct) find_band(a, b, distance2, band);
-    const int steps = n + m;
     int i = 0, j = 0;
     const auto at_a = [&] { return a[(band.start_a + i) % n]; };
     const auto at_b = [&] { return b[(band.start_b - j + 2 * m) % m]; };
     const std::array<int, 3> cut = direct ? std::array<int, 3>{-1, -1, -1} : part_in_three(band);
-    const int ring = edges + p.centre_count;
+    const int ring = p.centre_count;
+    const auto add_to_centre = [&](int place) {
+        p.centre_edges[ring + place] |= static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
+    };
     int place = 2;  // the last ring vertex before the first cut
-    for (int s = 0; s < steps; ++s) {
+    for (int s = 0; s < n + m; ++s) {
         if (place < 2 ? s == cut[place + 1] : s == cut[0]) {
-            const int before = ring + place, after = ring + (place + 1) % 3;
+            const int before = place;
             place = (place + 1) % 3;
-            p.centre_edges[p.centre_count + place] = static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
-            add(p, after, before, at_a());
-            add(p, before, after, at_b());
+            add_to_centre(place);
+            add(p, edges + ring + place, edges + ring + before, at_a());
+            add(p, edges + ring + before, edges + ring + place, at_b());
         }
-        const int from_a = at_a(), from_b = at_b();
+        const int from_a = at_a(), from_b = at_b(), centre = edges + ring + place;
         ++(band.along_a[s] ? i : j);
+        if (!direct) add_to_centre(place);
         if (band.along_a[s])
-            add(p, from_a, at_a(), direct ? from_b : ring + place);
+            add(p, from_a, at_a(), direct ? from_b : centre);
         else
-            add(p, at_b(), from_b, direct ? from_a : ring + place);
+            add(p, at_b(), from_b, direct ? from_a : centre);
     }
-    if (!direct) p.centre_count += 3;
+    if (direct) return;
+    for (int k = ring; k < ring + 3; ++k)
+        p.around_edges[k] = static_cast<std::uint16_t>(mask_of(a) | mask_of(b));
+    p.centre_count += 3;
 }
 
 /// Discs for all loops but the two that a tunnel joins (-1: none).
 Pattern make_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b) {
     Pattern p;
     for (int k = 0; k < static_cast<int>(loops.size()); ++k) {
-        for (const int e : loops[k]) p.edge_mask |= static_cast<std::uint16_t>(1 << e);
+        p.edge_mask |= mask_of(loops[k]);
         if (k != tunnel_a && k != tunnel_b) add_disc(p, loops[k]);
     }
     if (tunnel_a >= 0) add_tunnel(p, loops[tunnel_a], loops[tunnel_b]);

@@ -22,11 +22,12 @@ constexpr int upper_corner(int e) { return lower_corner(e) + (1 << (e / 4)); }
 constexpr int max_triangles = 24, max_centres = 4;
 
 /// How to triangulate a cell: triples of vertices, 0…11 the crossing of that edge, 12 + k the k-th extra
-/// vertex inside the cell, which lies at the mean of the crossings in `centre_edges[k]` (a bit per edge).
+/// vertex inside the cell. That lies midway between the mean of the crossings in `centre_edges[k]` (a bit per
+/// edge) and the mean of those in `around_edges[k]`.
 struct Pattern {
     std::uint8_t triangle_count = 0, centre_count = 0;
     std::uint16_t edge_mask = 0;
-    std::array<std::uint16_t, max_centres> centre_edges{};
+    std::array<std::uint16_t, max_centres> centre_edges{}, around_edges{};
     std::array<std::array<std::uint8_t, 3>, max_triangles> triangles{};
 };
 

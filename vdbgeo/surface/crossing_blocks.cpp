@@ -68,11 +68,26 @@ CrossingBlocks::CrossingBlocks(const openvdb::FloatTree& tree, const Frame& fram
     progress.report(1);
 }
 
+/// Whether a block of `dim` voxels with its first at `origin` lies outside the box.
+bool CrossingBlocks::outside_box(const Coord& origin, int dim) const {
+    if (!frame_.bounded()) return false;
+    for (int a = 0; a < 3; ++a)
+        if (origin[a] <= -dim || origin[a] >= frame_.size[a]) return true;
+    return false;
+}
+
 /// A node and its lower neighbours: their last cells reach into it.
 void CrossingBlocks::add_nodes(const Coord& origin) {
+    if (outside_box(origin, node_voxels)) return;
+    // The neighbours' indices are 32-bit numbers too.
+    constexpr std::int64_t end = std::int64_t{1} << 31, room = 2 * node_voxels;
+    for (int a = 0; a < 3; ++a)
+        if (origin[a] < -end + room || origin[a] >= end - room)
+            throw InvalidInput(
+                fmt::format("a block of the grid begins at index {}, too near to 2^31", origin[a]));
     for (int side = 0; side < 8; ++side) {
         const Coord c = offset(origin, side, -node_voxels);
-        if (frame_.bounded() && (c.x() < 0 || c.y() < 0 || c.z() < 0)) continue;
+        if (outside_box(c, node_voxels)) continue;
         node_at_.emplace(c, 0);
     }
 }
@@ -88,7 +103,7 @@ void CrossingBlocks::collect_nodes() {
         for (auto it = node->cbeginValueAll(); it; ++it)
             if (sign_state(*it) != outside) add_nodes(it.getCoord());
     for (auto it = tree_.root().cbeginValueAll(); it; ++it)
-        if (sign_state(*it) != outside)
+        if (sign_state(*it) != outside && !outside_box(it.getCoord(), leaf::UpperNode::DIM))
             throw InvalidInput(
                 "a constant block of 4096³ voxels lies across the isovalue from the background");
 
@@ -132,10 +147,7 @@ void CrossingBlocks::find_blocks(std::size_t n, std::vector<Block>& out) const {
     const Node& node = nodes_[n];
     constexpr int m = node_dim + 1;
     std::array<std::uint8_t, m * m * m> state;  // of this node's blocks and of the next layer
-    const auto outside = [&](const Coord& c) {
-        return frame_.bounded() &&
-               (c.x() >= frame_.size.x() || c.y() >= frame_.size.y() || c.z() >= frame_.size.z());
-    };
+    const auto outside = [&](const Coord& c) { return outside_box(c, leaf::dim); };
     std::uint8_t any = 0;
     for (int i = 0; i < m; ++i)
         for (int j = 0; j < m; ++j)

@@ -30,8 +30,8 @@ struct BlockSamples {
 /// children.
 class CrossingBlocks {
  public:
-    /// Throws InvalidInput where a constant tile of 4096³ voxels lies across the isovalue from the
-    /// background.
+    /// Throws InvalidInput where a constant tile of 4096³ voxels in the box lies across the isovalue from the
+    /// background, and where a node lies within 256 voxels of an end of the indices.
     CrossingBlocks(const openvdb::FloatTree& tree, const Frame& frame, float isovalue,
                    const Progress& progress);
 
@@ -71,6 +71,7 @@ class CrossingBlocks {
     static int place(int i, int j, int k) { return (i * node_dim + j) * node_dim + k; }
     State sign_state(float value) const { return value >= isovalue_ ? above : below; }
     Place step(const Block& block, int side) const;
+    bool outside_box(const openvdb::Coord& origin, int dim) const;
     void add_nodes(const openvdb::Coord& origin);
     void collect_nodes();
     void classify(Node& node) const;

@@ -124,6 +124,7 @@ class Extraction {
  public:
     Extraction(const DensityMap& map, float isovalue, const Progress& progress)
         : frame_(map.frame),
+          mirrored_(map.frame.axes.determinant() < 0),
           isovalue_(isovalue),
           progress_(progress),
           blocks_(map.grid->constTree(), map.frame, isovalue, progress.part(0, 0.2)),
@@ -283,6 +284,13 @@ class Extraction {
         return on_edge(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1), e / 4, crossing(value(c), value(d)));
     }
 
+    Vec3d mean_crossing(const BlockSamples& s, int x, int y, int z, unsigned edges) const {
+        Vec3d sum = Vec3d::Zero();
+        for (unsigned left = edges; left; left &= left - 1)
+            sum += crossing_on(s, x, y, z, __builtin_ctz(left));
+        return sum / __builtin_popcount(edges);
+    }
+
     void make_triangles(std::size_t b, Workspace& work) {
         for (int side = 0; side < 8; ++side) {
             const std::int64_t n = blocks_.neighbour(b, side);
@@ -299,18 +307,18 @@ class Extraction {
             const VertexId* number = work.numbers.cell(x, y, z);
             for (std::size_t e = 0; e < cell::edges; ++e) id[e] = number[edge_place[e]];
             for (std::size_t k = 0; k < p.centre_count; ++k) {
-                Vec3d sum = Vec3d::Zero();
-                for (unsigned left = p.centre_edges[k]; left; left &= left - 1)
-                    sum += crossing_on(s, x, y, z, __builtin_ctz(left));
-                mesh_.points[extra] = world(blocks_.origin(b), sum / __builtin_popcount(p.centre_edges[k]));
+                const Vec3d place = 0.5 * (mean_crossing(s, x, y, z, p.centre_edges[k]) +
+                                           mean_crossing(s, x, y, z, p.around_edges[k]));
+                mesh_.points[extra] = world(blocks_.origin(b), place);
                 id[cell::edges + k] = static_cast<VertexId>(extra++);
             }
             for (std::size_t k = 0; k < p.triangle_count; ++k, ++out)
-                for (std::size_t v = 0; v < 3; ++v) (*out)[v] = id[p.triangles[k][v]];
+                for (std::size_t v = 0; v < 3; ++v) (*out)[mirrored_ ? 2 - v : v] = id[p.triangles[k][v]];
         });
     }
 
     const Frame frame_;
+    const bool mirrored_;  // the frame turns triangles round
     const double isovalue_;
     const Progress progress_;
     const CrossingBlocks blocks_;
@@ -329,6 +337,7 @@ void MarchingCubesOptions::check() const {
 
 TriMesh marching_cubes(const DensityMap& map, const MarchingCubesOptions& options, const Progress& progress) {
     options.check();
+    if (map.frame.bounded() && map.frame.size.minCoeff() < 2) return {};  // no cells
     return Extraction(map, static_cast<float>(options.isovalue), progress).run();
 }
 

@@ -22,7 +22,7 @@ struct MarchingCubesOptions {
 /// surface is a closed, oriented 2-manifold with the topology of the trilinear interpolant in every cell:
 /// faces by the asymptotic decider (Nielson & Hamann, Visualization '91), the inside by an exact sweep
 /// (cell_topology.h; it settles what Chernyaev's Marching Cubes 33, CERN CN/95-17, settles by tests). Normals
-/// point from dense to empty.
+/// point from dense to empty, in a mirrored frame too. A map of one layer has no cells and no surface.
 ///
 /// A vertex lies on a grid edge, at the linear interpolation of the edge's two samples but at least 1/1024 of
 /// the edge from either end, so that no two vertices coincide where a sample equals the isovalue. It is
@@ -31,7 +31,8 @@ struct MarchingCubesOptions {
 ///
 /// Cost: one read of the leaves, then time and memory in proportion to the 8³ blocks that the surface crosses
 /// (about 0.4 KB each beside the mesh). An isovalue that nothing crosses gives an empty mesh. Throws
-/// InvalidInput for an isovalue that is not finite and for a mesh of 2^32 vertices or more; Cancelled.
+/// InvalidInput for an isovalue that is not finite, for a mesh of 2^32 vertices or more and for an unbounded
+/// grid with nodes at the very end of the 32-bit indices; Cancelled.
 TriMesh marching_cubes(const DensityMap& map, const MarchingCubesOptions& options,
                        const Progress& progress = {});
 

@@ -68,7 +68,8 @@ openvdb::math::Transform::Ptr transform_of(const Frame& frame) {
         const openvdb::Vec3d scale(axes(0, 0), axes(1, 1), axes(2, 2));
         const openvdb::Vec3d shift(frame.origin.x(), frame.origin.y(), frame.origin.z());
         if (scale[0] == scale[1] && scale[1] == scale[2])
-            return std::make_shared<vm::Transform>(vm::MapBase::Ptr(new vm::UniformScaleTranslateMap(scale[0], shift)));
+            return std::make_shared<vm::Transform>(
+                vm::MapBase::Ptr(new vm::UniformScaleTranslateMap(scale[0], shift)));
         return std::make_shared<vm::Transform>(vm::MapBase::Ptr(new vm::ScaleTranslateMap(scale, shift)));
     }
     vm::Mat4d m = vm::Mat4d::identity();  // row vectors: row a is the step along axis a

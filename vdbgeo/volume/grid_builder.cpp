@@ -74,8 +74,8 @@ Moments moments_of(const Block& block) {
     return m;
 }
 
-/// A whole block in one pass, relative to its first value so that nothing cancels. Returns false when a sample
-/// is not finite.
+/// A whole block in one pass, relative to its first value so that nothing cancels. Returns false when a
+/// sample is not finite.
 bool quick_moments_of(const float* values, Moments& m) {
     const float first = values[0];
     const __m128d shift = _mm_set1_pd(first);
@@ -132,7 +132,8 @@ bool all_same_bits(const float* values) {
 
 void SparsifyOptions::check() const {
     if (threshold && !std::isfinite(*threshold)) throw InvalidInput("the threshold is not a finite number");
-    if (background && !std::isfinite(*background)) throw InvalidInput("the background is not a finite number");
+    if (background && !std::isfinite(*background))
+        throw InvalidInput("the background is not a finite number");
     if (band && !threshold) throw InvalidInput("a band needs an isovalue (the threshold) to lie about");
     if (band && !(*band > 0 && std::isfinite(*band))) throw InvalidInput("the band's width is not positive");
 }
@@ -175,7 +176,8 @@ GridBuilder::GridBuilder(const Vec3i& size, const std::array<int, 3>& order, con
     if (size.minCoeff() < 1) throw InvalidInput("a map needs at least one sample along each axis");
     std::array<int, 3> sorted = order;
     std::sort(sorted.begin(), sorted.end());
-    if (sorted != std::array<int, 3>{0, 1, 2}) throw InvalidInput("the axis order is not a permutation of x, y, z");
+    if (sorted != std::array<int, 3>{0, 1, 2})
+        throw InvalidInput("the axis order is not a permutation of x, y, z");
     State& s = *state_;
     s.size = size;
     s.order = order;
@@ -197,7 +199,8 @@ void GridBuilder::State::sample_border(const float* data, int count) {
         if (border_seen++ % border_step == 0 && std::isfinite(v)) border.push_back(v);
     };
     for (int s = 0; s < count; ++s) {
-        const float* section = data + static_cast<std::size_t>(s) * stride[static_cast<std::size_t>(order[2])];
+        const float* section =
+            data + static_cast<std::size_t>(s) * stride[static_cast<std::size_t>(order[2])];
         const bool outer = done + s == 0 || done + s == sections - 1;
         for (int r = 0; r < rows; ++r) {
             const float* row = section + static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
@@ -216,21 +219,23 @@ void GridBuilder::State::load(const float* data, int first, const Coord& origin,
     const std::size_t sx = stride[0], sy = stride[1], sz = stride[2];
     Vec3i start(origin.x(), origin.y(), origin.z());
     start[order[2]] -= first;
-    const float* base = data + static_cast<std::size_t>(start.x()) * sx + static_cast<std::size_t>(start.y()) * sy +
-                        static_cast<std::size_t>(start.z()) * sz;
+    const float* base = data + static_cast<std::size_t>(start.x()) * sx +
+                        static_cast<std::size_t>(start.y()) * sy + static_cast<std::size_t>(start.z()) * sz;
     if (block.whole() && sx == 1) {  // x runs fastest: 8 × 8 transposes
         for (std::size_t y = 0; y < 8; ++y)
-            transpose_8x8(base + y * sy, sz, block.values + leaf::offset(0, static_cast<int>(y), 0), leaf::rows);
+            transpose_8x8(base + y * sy, sz, block.values + leaf::offset(0, static_cast<int>(y), 0),
+                          leaf::rows);
     } else if (block.whole() && sy == 1) {
         for (std::size_t x = 0; x < 8; ++x)
-            transpose_8x8(base + x * sx, sz, block.values + leaf::offset(static_cast<int>(x), 0, 0), leaf::dim);
+            transpose_8x8(base + x * sx, sz, block.values + leaf::offset(static_cast<int>(x), 0, 0),
+                          leaf::dim);
     } else {
         for (int x = 0; x < block.extent.x(); ++x)
             for (int y = 0; y < block.extent.y(); ++y)
                 for (int z = 0; z < block.extent.z(); ++z)
-                    block.values[leaf::offset(x, y, z)] = base[static_cast<std::size_t>(x) * sx +
-                                                              static_cast<std::size_t>(y) * sy +
-                                                              static_cast<std::size_t>(z) * sz];
+                    block.values[leaf::offset(x, y, z)] =
+                        base[static_cast<std::size_t>(x) * sx + static_cast<std::size_t>(y) * sy +
+                             static_cast<std::size_t>(z) * sz];
     }
 }
 
@@ -246,7 +251,8 @@ void GridBuilder::State::decide(const Block& block, Result& result) const {
         result.tile_value = high;
         return;
     }
-    if (block.whole() && all_same_bits(block.values) && (keep_all || (block.values[0] > low && block.values[0] <= high))) {
+    if (block.whole() && all_same_bits(block.values) &&
+        (keep_all || (block.values[0] > low && block.values[0] <= high))) {
         result.tile = Result::Tile::kept;
         result.tile_value = block.values[0];
         return;
@@ -269,7 +275,8 @@ void GridBuilder::State::decide(const Block& block, Result& result) const {
     result.leaf = std::move(made);
 }
 
-void GridBuilder::State::take_block(const float* data, int first, int count, int i, int j, Result& result) const {
+void GridBuilder::State::take_block(const float* data, int first, int count, int i, int j,
+                                    Result& result) const {
     Vec3i origin = Vec3i::Zero(), extent;
     origin[order[0]] = i * leaf::dim;
     origin[order[1]] = j * leaf::dim;
@@ -294,7 +301,8 @@ void GridBuilder::add_sections(const float* data, int count) {
     const std::size_t blocks = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
     for (int first = 0; first < count; first += slab) {
         const int height = std::min(slab, count - first);
-        const float* slab_data = data + static_cast<std::size_t>(first) * s.stride[static_cast<std::size_t>(s.order[2])];
+        const float* slab_data =
+            data + static_cast<std::size_t>(first) * s.stride[static_cast<std::size_t>(s.order[2])];
         std::vector<State::Result> results(blocks);
         parallel_for(blocks, 16, [&](std::size_t b) {
             const int i = static_cast<int>(b % static_cast<std::size_t>(across));

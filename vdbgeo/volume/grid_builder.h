@@ -14,8 +14,8 @@ namespace vdbgeo {
 struct SparsifyOptions {
     /// Keep samples above this value; the rest reads as the background.
     std::optional<float> threshold;
-    /// Keep samples within `band` of `threshold` (which is then the isovalue). What lies above the band is not
-    /// active and reads as the band's upper end, so the surface at the isovalue is unchanged.
+    /// Keep samples within `band` of `threshold` (which is then the isovalue). What lies above the band is
+    /// not active and reads as the band's upper end, so the surface at the isovalue is unchanged.
     std::optional<float> band;
     /// The value of what was dropped: the solvent level. Unset: the median over the faces of the box, but not
     /// above the threshold (or the band's lower end).

@@ -1,0 +1,88 @@
+// vdbgeo convert (also mrc2vdb and vdb2mrc): map, grid and mesh files into each other.
+#include <fmt/format.h>
+
+#include "apps/command.h"
+#include "apps/flags.h"
+#include "apps/reports.h"
+#include "converters/mesh_file.h"
+
+namespace vdbgeo::app {
+namespace {
+
+struct ConvertOptions {
+    std::string in, out;
+    MapFlags map;
+    VdbWriteOptions vdb;
+    MrcWriteOptions mrc;
+};
+
+void convert_mesh(const ConvertOptions& o, Session& session) {
+    if (!is_mesh_ending(o.out))
+        throw UsageError(fmt::format("{}: a mesh becomes one of .ply .obj .off .stl", o.out));
+    const auto progress = session.stage("converting");
+    const TriMesh mesh = read_mesh(o.in, progress.part(0, 0.5));
+    write_mesh(mesh, o.out, {}, progress.part(0.5, 1));
+    session.result(
+        {{"in", o.in}, {"out", o.out}, {"vertices", mesh.points.size()}, {"faces", mesh.triangles.size()}});
+}
+
+void convert_map(const ConvertOptions& o, Session& session) {
+    Json seconds;
+    Clock clock;
+    const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
+    seconds["read"] = clock.lap();
+    for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
+    if (is_vdb_ending(o.out))
+        write_vdb({in.map.grid}, o.out, o.vdb, session.stage("writing"));
+    else
+        write_mrc(in.map, o.out, o.mrc, session.stage("writing"));
+    seconds["write"] = clock.lap();
+    session.end_stage();
+    Json j{{"in", o.in}, {"out", o.out}};
+    j.update(grid_json(in.map));
+    j["warnings"] = in.warnings;
+    j["seconds"] = seconds;
+    if (!session.json && !session.quiet)
+        session.say(
+            fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB",
+                        o.out, j["active_voxels"].dump(), j["bytes_in_memory"].get<double>() / 1e6,
+                        j["dense_bytes"].get<double>() / 1e6));
+    session.result(j);
+}
+
+void run_convert(const ConvertOptions& o, Session& session) {
+    if (is_mesh_ending(o.in)) return convert_mesh(o, session);
+    if (is_mesh_ending(o.out))
+        throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
+    if (!is_vdb_ending(o.out) && !is_map_ending(o.out))
+        throw UsageError(fmt::format(
+            "{}: the ending tells the format: .vdb, .mrc .map .ccp4 .rec, or .ply .obj .off .stl", o.out));
+    if (o.out != "-" && (o.out.size() > 3 && (o.out.substr(o.out.size() - 3) == ".gz")))
+        throw UsageError(fmt::format("{}: maps are written plain; compress the file afterwards", o.out));
+    convert_map(o, session);
+}
+
+}  // namespace
+
+Command convert_command() {
+    return {"convert", "Convert between map (MRC, CCP4), grid (VDB) and mesh files, by their endings",
+            "  vdbgeo convert emd_1080.map emd_1080.vdb --threshold 1.5sigma", [](CLI::App& app) {
+                auto o = std::make_shared<ConvertOptions>();
+                app.add_option("in", o->in, "Map, grid or mesh file")->required();
+                app.add_option("out", o->out,
+                               "File to write: .vdb; .mrc .map .ccp4 .rec; .ply .obj .off .stl")
+                    ->required();
+                o->map.add_reading(app);
+                o->map.add_sparsify(app);
+                add_vdb_flags(app, o->vdb);
+                app.add_option("--mode", o->mrc.mode,
+                               "MRC mode to write: 0, 1, 2, 6, 12 or 101 [the input's, else 2]");
+                return [o](Session& session) {
+                    o->map.finish();
+                    check_usage(o->mrc);
+                    run_convert(*o, session);
+                };
+            }};
+}
+
+}  // namespace vdbgeo::app

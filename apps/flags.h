@@ -1,0 +1,53 @@
+// Command-line flags bound to the options structs: a default stands once, in the struct.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <string>
+
+#include "converters/map_file.h"
+#include "converters/vdb_file.h"
+#include "vdbgeo/view/render.h"
+#include "vdbgeo/volume/isovalue.h"
+
+namespace vdbgeo::app {
+
+/// Flags whose text is turned into options once all are parsed.
+struct MapFlags {
+    MapReadOptions options;
+    std::string threshold, origin = "auto", mode0 = "auto", voxel_size;
+
+    /// How a map is read: frame, modes, volume, grid.
+    void add_reading(CLI::App& app);
+    /// Which samples are kept.
+    void add_sparsify(CLI::App& app);
+    /// Turns texts into options; throws UsageError.
+    void finish();
+};
+
+struct IsoFlag {
+    std::string text = "auto";
+    void add(CLI::App& app);
+    Isovalue parse() const;
+};
+
+void add_vdb_flags(CLI::App& app, VdbWriteOptions& options);
+void add_render_flags(CLI::App& app, RenderOptions& options);
+
+/// Runs an options check and turns what it finds into a usage error.
+template <class Options>
+void check_usage(const Options& options);
+
+}  // namespace vdbgeo::app
+
+#include "apps/session.h"
+#include "vdbgeo/core/errors.h"
+
+template <class Options>
+void vdbgeo::app::check_usage(const Options& options) {
+    try {
+        options.check();
+    } catch (const InvalidInput& e) {
+        throw UsageError(e.what());
+    }
+}

@@ -1,0 +1,109 @@
+#include "apps/session.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdio>
+#include <mutex>
+
+namespace vdbgeo::app {
+namespace {
+
+volatile sig_atomic_t interrupted = 0;
+
+void on_interrupt(int) {
+    if (interrupted) _exit(130);  // a second Ctrl-C does not wait
+    interrupted = 1;
+}
+
+}  // namespace
+
+double Clock::seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+double Clock::lap() {
+    const double passed = seconds();
+    start_ = std::chrono::steady_clock::now();
+    return passed;
+}
+
+/// Draws at most ten times a second, from whichever thread reports.
+class Session::Bar {
+ public:
+    Bar(std::string name, bool quiet)
+        : name_(std::move(name)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+
+    bool report(double fraction) {
+        if (interrupted) return false;
+        if (quiet_ || !terminal_) return true;
+        const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+        if (!lock || clock_.seconds() - drawn_ < 0.1) return true;
+        drawn_ = clock_.seconds();
+        best_ = std::max(best_, fraction);
+        const int width = 24, filled = static_cast<int>(best_ * width);
+        const double left = best_ > 0.01 ? drawn_ * (1 - best_) / best_ : 0;
+        fmt::print(stderr, "\r{:<10} [{}{}] {:3.0f} %  {:.0f} %/s  {:.0f} s left \033[K", name_,
+                   std::string(filled, '#'), std::string(width - filled, '.'), 100 * best_,
+                   100 * best_ / drawn_, left);
+        std::fflush(stderr);
+        return true;
+    }
+
+    void end() {
+        if (quiet_ || ended_) return;
+        ended_ = true;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        fmt::print(stderr, "{}{:<10} {:.2f} s{}\n", terminal_ ? "\r" : "", name_, clock_.seconds(),
+                   terminal_ ? "\033[K" : "");
+    }
+
+ private:
+    const std::string name_;
+    const bool quiet_, terminal_;
+    Clock clock_;
+    double drawn_ = 0, best_ = 0;
+    bool ended_ = false;
+    std::mutex mutex_;
+};
+
+Progress Session::stage(const std::string& name) {
+    end_stage();
+    bar_ = std::make_shared<Bar>(name, quiet);
+    return Progress([bar = bar_](double fraction) { return bar->report(fraction); });
+}
+
+void Session::end_stage() {
+    if (bar_) bar_->end();
+    bar_.reset();
+}
+
+void Session::say(const std::string& line) {
+    end_stage();
+    fmt::print(json ? stderr : stdout, "{}\n", line);
+}
+
+void Session::warn(const std::string& line) {
+    end_stage();
+    fmt::print(stderr, "vdbgeo: warning: {}\n", line);
+}
+
+void Session::result(const Json& value) {
+    end_stage();
+    if (json) fmt::print("{}\n", value.dump(2));
+}
+
+Session::~Session() { end_stage(); }
+
+void install_interrupt_handler() {
+    struct sigaction action {};
+    action.sa_handler = on_interrupt;
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+    signal(SIGPIPE, SIG_IGN);  // a closed pipe is a write error, not a silent death
+    signal(SIGXFSZ, SIG_IGN);  // so is a file that grew over its limit
+}
+
+}  // namespace vdbgeo::app

@@ -1,0 +1,60 @@
+// What a run of a command shares: options for all commands, progress on the terminal, and what it prints.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "vdbgeo/core/progress.h"
+
+namespace vdbgeo::app {
+
+using Json = nlohmann::ordered_json;
+
+/// A command line that makes no sense: exit code 2.
+class UsageError : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/// Seconds since it was made, or since the last `lap`.
+class Clock {
+ public:
+    double seconds() const;
+    double lap();
+
+ private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+class Session {
+ public:
+    bool json = false;   ///< one JSON object on standard output, all else on standard error
+    bool quiet = false;  ///< no progress
+    int threads = 0;     ///< 0: as many as there are
+
+    /// Progress of one stage: a bar with rate and time left on a terminal, else one line when it ends.
+    Progress stage(const std::string& name);
+    /// Ends the running stage's line; called by everything that prints.
+    void end_stage();
+    /// One line for people: standard output, or standard error with --json.
+    void say(const std::string& line);
+    /// One line on standard error.
+    void warn(const std::string& line);
+    /// The result. Printed as JSON with --json.
+    void result(const Json& json);
+
+    ~Session();
+
+ private:
+    class Bar;
+    std::shared_ptr<Bar> bar_;
+};
+
+/// Ctrl-C sets a flag that every progress report looks at.
+void install_interrupt_handler();
+
+}  // namespace vdbgeo::app

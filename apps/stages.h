@@ -1,0 +1,36 @@
+// Steps that several commands share: they read files, call the library, and say what they found.
+#pragma once
+
+#include <string>
+
+#include "apps/session.h"
+#include "converters/map_file.h"
+#include "vdbgeo/core/tri_mesh.h"
+#include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/volume/isovalue.h"
+#include "vdbgeo/volume/phantom.h"
+
+namespace vdbgeo::app {
+
+struct Surface {
+    TriMesh mesh;
+    double isovalue = 0;
+};
+
+/// The surface of a map by marching cubes; of a level set (negative inside) with its faces turned outward.
+/// NumericalError where nothing crosses the isovalue, telling the map's range.
+Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
+                        const Progress& progress);
+
+/// A phantom as a map, with its noise or without.
+DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress);
+
+/// One line where the surface is open: it can be so only where the density meets the border of the map.
+void say_where_open(const MeshMeasures& measures, Session& session);
+
+/// The histogram of the triangles' angles (the paper's Fig 7) as a picture.
+void write_angle_histogram(const MeshMeasures& measures, const std::string& path);
+
+bool has_ending(const std::string& name, const std::string& ending);
+
+}  // namespace vdbgeo::app

@@ -1,0 +1,34 @@
+// The leaves of a sparse grid → dense sections.
+#pragma once
+
+#include <array>
+
+#include "vdbgeo/volume/density_map.h"
+
+namespace vdbgeo {
+
+/// Hands out a box of a grid section by section, as GridBuilder takes them in: order[0] is the axis that runs
+/// fastest, order[2] the one along which sections follow each other. Every sample has the grid's stored
+/// value, active or not.
+class DenseSections {
+ public:
+    DenseSections(const openvdb::FloatGrid& grid, const Vec3i& first, const Vec3i& size,
+                  const std::array<int, 3>& order)
+        : grid_(grid), first_(first), size_(size), order_(order) {}
+
+    /// Sections in the piece that starts with section `section`: up to the border of the leaves there.
+    int piece(int section) const;
+    /// The most samples that a piece has.
+    std::size_t largest_piece() const;
+    /// Writes piece(section) sections to `out`, in parallel.
+    void fill(int section, float* out) const;
+
+ private:
+    void fill_row_of_leaves(int section, int row_leaf, float* out) const;
+
+    const openvdb::FloatGrid& grid_;
+    Vec3i first_, size_;
+    std::array<int, 3> order_;
+};
+
+}  // namespace vdbgeo

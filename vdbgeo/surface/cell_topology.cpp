@@ -251,10 +251,8 @@ void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
 /// Discs for all loops but the two that a tunnel joins (-1: none).
 Pattern make_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b) {
     Pattern p;
-    for (int k = 0; k < static_cast<int>(loops.size()); ++k) {
-        p.edge_mask |= mask_of(loops[k]);
+    for (int k = 0; k < static_cast<int>(loops.size()); ++k)
         if (k != tunnel_a && k != tunnel_b) add_disc(p, loops[k]);
-    }
     if (tunnel_a >= 0) add_tunnel(p, loops[tunnel_a], loops[tunnel_b]);
     return p;
 }
@@ -398,21 +396,14 @@ class Sweep {
 
 }  // namespace
 
-bool depends_on_values(int sign_case) {
-    const Tables& t = tables();
-    return t.ambiguous_count[sign_case] > 0 || t.entries[t.first[sign_case]].loop_count > 1;
-}
-
-const Pattern& simple_pattern(int sign_case) {
-    const Tables& t = tables();
-    return t.entries[t.first[sign_case]].separate;
-}
-
 const std::array<const Pattern*, 256>& fixed_patterns() {
     static const auto instance = [] {
+        const Tables& t = tables();
         std::array<const Pattern*, 256> patterns{};
-        for (int c = 0; c < 256; ++c)
-            if (!depends_on_values(c)) patterns[c] = &simple_pattern(c);
+        for (int c = 0; c < 256; ++c) {
+            const Entry& entry = t.entries[t.first[c]];
+            if (t.ambiguous_count[c] == 0 && entry.loop_count <= 1) patterns[c] = &entry.separate;
+        }
         return patterns;
     }();
     return instance;

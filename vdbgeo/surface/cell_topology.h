@@ -26,17 +26,12 @@ constexpr int max_triangles = 24, max_centres = 4;
 /// edge) and the mean of those in `around_edges[k]`.
 struct Pattern {
     std::uint8_t triangle_count = 0, centre_count = 0;
-    std::uint16_t edge_mask = 0;
     std::array<std::uint16_t, max_centres> centre_edges{}, around_edges{};
     std::array<std::array<std::uint8_t, 3>, max_triangles> triangles{};
 };
 
-/// The patterns of the 256 sign cases (bit c set: corner c is inside). For a case without an ambiguous face
-/// and with a single loop the pattern depends on the case alone.
-bool depends_on_values(int sign_case);
-const Pattern& simple_pattern(int sign_case);
-
-/// simple_pattern of every case, null where the pattern depends on the values: for inner loops.
+/// The patterns of the 256 sign cases (bit c set: corner c is inside) that depend on the case alone: those
+/// without an ambiguous face and with a single loop. Null for the others.
 const std::array<const Pattern*, 256>& fixed_patterns();
 
 /// The pattern with the topology of the trilinear interpolant, for any case. `d` are the corner values minus

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
+#include "converters/mrc.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/volume/grid_builder.h"
 #include "vdbgeo/volume/phantom.h"
@@ -25,25 +24,13 @@ Source phantom_source(const std::string& kind, int size, std::optional<double> s
 }
 
 Source mrc_source(const std::string& path) {
-    const auto file = std::make_shared<std::ifstream>(path, std::ios::binary);
-    std::int32_t word[256];
-    if (!file->read(reinterpret_cast<char*>(word), sizeof word)) throw IoError(path + ": cannot be read");
-    if (word[3] != 2 || word[16] != 1 || word[17] != 2 || word[18] != 3)
-        throw InvalidInput(path + ": only mode 2 with columns along x and sections along z is benchmarked");
-    Source source;
-    source.name = std::filesystem::path(path).filename().string();
-    source.frame.size = Vec3i(word[0], word[1], word[2]);
-    float cell[3];
-    std::memcpy(cell, word + 10, sizeof cell);
-    for (int a = 0; a < 3; ++a) source.frame.axes(a, a) = static_cast<double>(cell[a]) / word[7 + a];
-    const std::streamoff data = static_cast<std::streamoff>(sizeof word) + word[23];
-    const std::size_t section = source.section_size() * sizeof(float);
-    source.sections = [file, path, data, section](int z0, int z1, float* out) {
-        file->seekg(data + static_cast<std::streamoff>(section) * z0);
-        const auto bytes = static_cast<std::streamsize>(section) * (z1 - z0);
-        if (!file->read(reinterpret_cast<char*>(out), bytes)) throw IoError(path + ": is cut short");
-    };
-    return source;
+    const auto reader = std::make_shared<MrcReader>(path);
+    if (reader->order() != std::array<int, 3>{0, 1, 2})
+        throw InvalidInput(path + ": only maps with columns along x and sections along z are benchmarked");
+    return {std::filesystem::path(path).filename().string(),
+            reader->frame(),
+            {},
+            [reader](int z0, int z1, float* out) { reader->read_sections(out, z1 - z0); }};
 }
 
 Inputs make_inputs(const Source& source, bool dense, bool all, std::optional<float> threshold) {

@@ -15,7 +15,7 @@ struct Source {
     std::string name;
     Frame frame;
     std::optional<double> isovalue;
-    std::function<void(int z0, int z1, float* out)> sections;  ///< x fastest
+    std::function<void(int z0, int z1, float* out)> sections;  ///< x fastest; asked for once, in order
 
     std::size_t section_size() const {
         return static_cast<std::size_t>(frame.size.x()) * static_cast<std::size_t>(frame.size.y());
@@ -24,7 +24,7 @@ struct Source {
 
 Source phantom_source(const std::string& kind, int size, std::optional<double> snr);
 
-/// The plainest MRC files only: mode 2, x fastest, this machine's byte order.
+/// A map file whose columns run along x and sections along z.
 Source mrc_source(const std::string& path);
 
 /// A source in the forms that contenders ask for; what nobody asks for is not made.

@@ -133,9 +133,8 @@ TEST(Render, ACoarseBallIsShadedLikeAFineOne) {
     options.occlusion_rays = 6;
     const auto [level, step] =
         shading_difference(render(icosphere(3, 10), options), render(icosphere(6, 10), options));
-    std::printf("level %g step %g\n", level, step);
-    EXPECT_LT(level, 0.03);
-    EXPECT_LT(step, 0.015);
+    EXPECT_LT(level, 0.012);
+    EXPECT_LT(step, 0.008);
 }
 
 TEST(Render, SkinnyTrianglesDoNotShow) {
@@ -145,9 +144,8 @@ TEST(Render, SkinnyTrianglesDoNotShow) {
     options.occlusion_rays = 6;
     const auto [level, step] = shading_difference(render(banded_ball(40, 48, 0.05), options),
                                                   render(banded_ball(200, 240, 1), options));
-    std::printf("level %g step %g\n", level, step);
-    EXPECT_LT(level, 0.03);
-    EXPECT_LT(step, 0.015);
+    EXPECT_LT(level, 0.012);
+    EXPECT_LT(step, 0.008);
 }
 
 TEST(Render, ATorusFromTheTopHasItsHole) {

@@ -59,7 +59,7 @@ bool can_render();
 /// P − Σ bᵢ min(0, (P − Vᵢ)·nᵢ) nᵢ for the point P of a face with vertices Vᵢ, normals nᵢ and barycentric
 /// coordinates bᵢ (J. Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021), and fill the
 /// hemisphere of the smooth normal, so that faces do not shade themselves where they stand for a convex
-/// surface. The price: creases are rounded, and shadows within a face's bulge of a crease are moved. Outlines
+/// surface. The price: sharp creases look rounded, and their shadows begin a little off the faces. Outlines
 /// keep the mesh's corners.
 ///
 /// Any triangle mesh will do: open, non-manifold, with zero-area faces; points no face uses are ignored. A
@@ -72,9 +72,8 @@ bool can_render();
 /// Errors: InvalidInput for bad options, an empty or damaged mesh, a mesh whose points all coincide, an
 /// unknown or non-scalar property, a build without embree; Cancelled by the progress.
 ///
-/// Cost: width · height · samples · (3 + occlusion_rays) rays where the surface is, cast eight at a time
-/// from a point: two for the shadow and the default six of occlusion cost little more than one; 64 bytes a
-/// vertex and 80 a face of memory besides the picture.
+/// Cost: width · height · samples · (3 + occlusion_rays) rays where the surface is, those of occlusion and
+/// shadow cast eight at a time; 64 bytes a vertex and 80 a face of memory besides the picture.
 Image render(const TriMesh& mesh, const RenderOptions& options = {}, const Progress& progress = {});
 
 }  // namespace vdbgeo

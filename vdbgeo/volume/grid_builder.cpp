@@ -140,9 +140,10 @@ void SparsifyOptions::check() const {
         throw InvalidInput(
             fmt::format("the band's width {} is lost in rounding beside the isovalue {}", *band, *threshold));
     if (threshold && background && *background > *threshold)
-        throw InvalidInput(fmt::format("the background {} lies above the threshold {}: what is dropped would "
-                                       "read as if it were kept",
-                                       *background, *threshold));
+        throw InvalidInput(
+            fmt::format("the background {} lies above the threshold {}: what is dropped would "
+                        "read as if it were kept",
+                        *background, *threshold));
 }
 
 struct GridBuilder::State {

@@ -17,6 +17,7 @@ std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
         const auto [rest, error] = std::from_chars(at, end, number);
         if (error != std::errc() || (rest != end && *rest != ',')) return {};
         numbers.push_back(number);
+        if (rest != end && rest + 1 == end) return {};  // a comma, and nothing behind it
         at = rest == end ? rest : rest + 1;
     }
     if (numbers.size() == 1 && one_is_enough) return Vec3d::Constant(numbers[0]);

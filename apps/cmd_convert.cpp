@@ -6,6 +6,7 @@
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -33,6 +34,10 @@ void convert_map(const ConvertOptions& o, Session& session) {
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
+    if (in.map.grid->activeVoxelCount() == 0)
+        throw NumericalError(
+            fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
+                        o.in, in.map.statistics.min, in.map.statistics.max));
     write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();

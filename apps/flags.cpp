@@ -96,7 +96,7 @@ void MapFlags::finish() {
 void IsoFlag::add(CLI::App& app) {
     app.add_option("--iso", text,
                    "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a "
-                   "level set)")
+                   "level set, half the maximum for a fog volume)")
         ->capture_default_str();
 }
 

@@ -50,18 +50,20 @@ TEST(Isovalue, ResolvesByItsRule) {
     s.count = 10;
     s.mean = 2;
     s.rms = 0.5;
-    EXPECT_EQ(Isovalue::parse("auto").resolve(s, false), 3.5);
-    EXPECT_EQ(Isovalue::parse("auto").resolve(s, true), 0);
-    EXPECT_EQ(Isovalue::parse("3sigma").resolve(s, true), 3.5);
-    EXPECT_EQ(Isovalue::parse("-1sigma").resolve(s, false), 1.5);
-    EXPECT_EQ(Isovalue::parse("0.7").resolve(s, false), 0.7);
+    s.max = 5;
+    EXPECT_EQ(Isovalue::parse("auto").resolve(s), 3.5);
+    EXPECT_EQ(Isovalue::parse("auto").resolve(s, openvdb::GRID_LEVEL_SET), 0);
+    EXPECT_EQ(Isovalue::parse("auto").resolve(s, openvdb::GRID_FOG_VOLUME), 2.5);
+    EXPECT_EQ(Isovalue::parse("3sigma").resolve(s, openvdb::GRID_LEVEL_SET), 3.5);
+    EXPECT_EQ(Isovalue::parse("-1sigma").resolve(s), 1.5);
+    EXPECT_EQ(Isovalue::parse("0.7").resolve(s), 0.7);
 }
 
 TEST(Isovalue, WithoutAFiniteSampleOnlyANumberResolves) {
     Statistics s;
-    EXPECT_THROW(Isovalue::parse("auto").resolve(s, false), InvalidInput);
+    EXPECT_THROW(Isovalue::parse("auto").resolve(s), InvalidInput);
     s.count = s.non_finite = 8;
-    EXPECT_THROW(Isovalue::parse("3sigma").resolve(s, false), InvalidInput);
-    EXPECT_EQ(Isovalue::parse("0.7").resolve(s, false), 0.7);
-    EXPECT_EQ(Isovalue::parse("auto").resolve(s, true), 0);
+    EXPECT_THROW(Isovalue::parse("3sigma").resolve(s), InvalidInput);
+    EXPECT_EQ(Isovalue::parse("0.7").resolve(s), 0.7);
+    EXPECT_EQ(Isovalue::parse("auto").resolve(s, openvdb::GRID_LEVEL_SET), 0);
 }

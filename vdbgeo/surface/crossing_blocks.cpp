@@ -136,10 +136,13 @@ void CrossingBlocks::classify(Node& node) const {
     node.state.resize(node_blocks);
     static_assert(LowerNode::NUM_VALUES == node_blocks, "the node's table has the block order of VDB's");
     for (auto it = lower->cbeginValueAll(); it; ++it) node.state[it.pos()] = sign_state(*it);
-    for (auto it = lower->cbeginChildOn(); it; ++it) {
-        const float* samples = it->buffer().data();
-        node.samples[it.pos()] = samples;
-        node.state[it.pos()] = leaf_state(samples, isovalue_);
+    // Two loops: the first finds the buffers without waiting for what lies in them.
+    for (auto it = lower->cbeginChildOn(); it; ++it) node.samples[it.pos()] = it->buffer().data();
+    for (std::size_t i = 0; i < node_blocks; ++i) {
+        constexpr std::size_t ahead = 2;
+        if (i + ahead < node_blocks && node.samples[i + ahead])
+            for (int k = 0; k < leaf::size; k += 16) _mm_prefetch(node.samples[i + ahead] + k, _MM_HINT_T0);
+        if (node.samples[i]) node.state[i] = leaf_state(node.samples[i], isovalue_);
     }
 }
 

@@ -1,7 +1,6 @@
 #include "vdbgeo/surface/marching_cubes.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 
 #include <atomic>
 #include <cmath>
@@ -87,18 +86,6 @@ constexpr std::array<int, cell::edges> make_edge_places() {
 }
 constexpr std::array<int, cell::edges> edge_place = make_edge_places();
 
-/// Asks for 2 MiB pages under memory that is about to be written for the first time: one page fault, not 512.
-void prefer_huge_pages(void* data, std::size_t bytes) {
-#ifdef MADV_HUGEPAGE
-    constexpr std::uintptr_t page = 4096;
-    const auto first = (reinterpret_cast<std::uintptr_t>(data) + page - 1) & ~(page - 1);
-    const auto last = (reinterpret_cast<std::uintptr_t>(data) + bytes) & ~(page - 1);
-    if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);  // only a wish
-#else
-    (void)data, (void)bytes;
-#endif
-}
-
 /// Calls visit(x, y, z, sign case) for the block's cells that the surface crosses, in a fixed order.
 template <class Visit>
 void for_each_crossed_cell(const BlockSamples& s, const Vec3i& cells, const Visit& visit) {
@@ -136,8 +123,6 @@ class Extraction {
         const auto [vertices, triangles] = number();
         mesh_.points.resize(vertices);
         mesh_.triangles.resize(triangles);
-        prefer_huge_pages(mesh_.points.data(), vertices * sizeof(Vec3f));
-        prefer_huge_pages(mesh_.triangles.data(), triangles * sizeof(Triangle));
         for_each_chunk(0.5, 1.0, [this](std::size_t b, Workspace& work) {
             place_vertices(b, work.samples);
             make_triangles(b, work);

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <future>
+#include <limits>
 
 #include "converters/vdb_file.h"
 #include "vdbgeo/core/errors.h"
@@ -57,11 +60,11 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
     SparsifyOptions sparsify = options.sparsify;
     double begin = 0;
     if (options.threshold_sigma) {
-        if (path == "-")
-            throw InvalidInput(
-                "standard input: a threshold in sigma reads the map twice, which a pipe does not allow; give "
-                "a "
-                "value");
+        std::error_code ignored;
+        if (!fs::is_regular_file(path, ignored) && (path == "-" || fs::exists(path, ignored)))
+            throw InvalidInput(fmt::format(
+                "{}: a threshold in sigma takes two readings, and a pipe has one: give it as a value",
+                path == "-" ? "standard input" : path.string()));
         const Statistics s = mrc_statistics(path, options, progress.part(0, 0.5));
         sparsify.threshold = static_cast<float>(s.mean + *options.threshold_sigma * s.rms);
         begin = 0.5;
@@ -105,9 +108,15 @@ MapFile read_map(const fs::path& path, const MapReadOptions& options, const Prog
         throw InvalidInput(fmt::format("{}: grid '{}': {}", path.string(), grid->getName(), e.what()));
     }
     result.level_set = grid->getGridClass() == openvdb::GRID_LEVEL_SET;
-    if (options.sparsify.threshold || options.threshold_sigma || options.invert)
+    const MrcReadOptions& mrc = options.mrc;
+    if (options.sparsify.threshold || options.threshold_sigma || options.sparsify.background ||
+        options.invert)
         result.warnings.push_back(
-            "the grid of a VDB file is taken as it is: neither threshold nor inversion was applied");
+            "the grid of a VDB file is taken as it is: neither threshold nor background nor inversion was "
+            "applied");
+    if (mrc.voxel_size_A || mrc.origin != OriginRule::automatic)
+        result.warnings.push_back(
+            "a VDB file lies where its transform says: neither voxel size nor origin was changed");
     progress.report(1);
     return result;
 }

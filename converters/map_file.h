@@ -16,7 +16,7 @@ struct MapReadOptions {
     MrcReadOptions mrc;        ///< how to read an MRC or CCP4 file
     SparsifyOptions sparsify;  ///< which samples to keep (of an MRC file; a VDB grid is taken as it is)
     /// Keep samples above the mean plus this many rms instead of above a fixed value; the file is then read
-    /// twice.
+    /// twice, so it cannot be a pipe.
     std::optional<double> threshold_sigma;
     /// Negate the samples of an MRC file: in raw tomograms what is dense is dark. Thresholds and statistics
     /// are then those of the negated values.

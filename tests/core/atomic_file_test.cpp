@@ -82,6 +82,21 @@ TEST(AtomicFile, AFullDeviceIsAnError) {
     EXPECT_THROW(file.stream() << std::string(4 << 20, 'x'), IoError);
 }
 
+TEST(AtomicFile, AfterALostWriteNothingIsCommitted) {
+    AtomicFile file("/dev/full");
+    EXPECT_THROW(file.write(std::string(4 << 20, 'x')), IoError);
+    EXPECT_THROW(file.commit(), IoError);
+}
+
+TEST(AtomicFile, ANameMayBeAsLongAsTheFileSystemAllows) {
+    TempFolder folder;
+    const std::string name(255, 'n');
+    write_file(folder / name, "text");
+    EXPECT_EQ(read_bytes(folder / name), "text");
+    EXPECT_THROW(write_file(folder / (name + "n"), "text"), IoError);
+    EXPECT_EQ(files_in(folder.path()), 1u);
+}
+
 TEST(AtomicFile, AMissingFolderAndAFolderAreErrors) {
     TempFolder folder;
     EXPECT_THROW(AtomicFile(folder / "none/a"), IoError);

@@ -52,6 +52,7 @@ class AtomicFile::Sink : public std::streambuf {
     int fd_ = -1;
     bool direct_ = false;  // not a regular file: no temporary, no rename
     bool committed_ = false;
+    bool lost_ = false;              // a write failed: what follows it must not become the target
     std::int64_t offset_ = 0;        // file offset of the buffer's start
     std::int64_t written_back_ = 0;  // up to here the kernel was asked to start writing
     std::vector<char> buffer_;
@@ -90,7 +91,7 @@ void AtomicFile::Sink::open_temporary() {
     fd_ = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
 #endif
     if (fd_ < 0) {  // a file system without unnamed files
-        std::string pattern = (folder / ("." + target_.filename().string() + ".XXXXXX")).string();
+        std::string pattern = (folder / ".vdbgeo.XXXXXX").string();
         fd_ = ::mkostemp(pattern.data(), O_CLOEXEC);
         if (fd_ < 0) fail("cannot be created", errno);
         temporary_ = pattern;
@@ -110,7 +111,10 @@ void AtomicFile::Sink::write_all(const char* data, std::size_t bytes) {
     while (bytes > 0) {
         const ssize_t n = ::write(fd_, data, bytes);
         if (n < 0 && errno == EINTR) continue;
-        if (n < 0) fail("writing failed", errno);
+        if (n < 0) {
+            lost_ = true;
+            fail("writing failed", errno);
+        }
         data += n;
         bytes -= static_cast<std::size_t>(n);
         offset_ += n;
@@ -167,6 +171,7 @@ AtomicFile::Sink::pos_type AtomicFile::Sink::seekoff(off_type offset, std::ios_b
 }
 
 void AtomicFile::Sink::commit() {
+    if (lost_) fail("writing failed", EIO);
     flush_buffer();
     if (direct_) {
         if (::close(std::exchange(fd_, -1)) != 0) fail("writing failed", errno);
@@ -178,8 +183,8 @@ void AtomicFile::Sink::commit() {
         const std::string self = fmt::format("/proc/self/fd/{}", fd_);
         for (int attempt = 0; temporary_.empty(); ++attempt) {
             fs::path candidate = target_;
-            candidate.replace_filename(
-                fmt::format(".{}.{}.{}", target_.filename().string(), ::getpid(), attempt));
+            // Not longer than the target's name may be on its own.
+            candidate.replace_filename(fmt::format(".vdbgeo.{}.{}", ::getpid(), attempt));
             if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, candidate.c_str(), AT_SYMLINK_FOLLOW) == 0)
                 temporary_ = candidate;
             else if (errno != EEXIST || attempt > 100)

@@ -21,8 +21,7 @@ const std::vector<Promise> promises{
      {"--size INT=128", "Voxel size in Å", "Radius in Å", "Height in Å", "Period in Å", "[no noise]"}},
     {"surface", {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
-    {"render",
-     {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=4", "--occlusion INT=8"}},
+    {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
 
 /// The words of the lines below "Example:" that call a program.

@@ -111,6 +111,7 @@ const std::vector<Refused> refused_files{
     {"aspire/falcon_2012_06_12-14_33_35_0.mrc", "is text"},
     {"surface_morphometrics/examples.tar.gz", "is a tar archive inside gzip"},
     {"oiio_damaged/bad-bbox-bomb.vdb", ""},
+    {"oiio_damaged/bad-bbox-empty.vdb", "holds no voxel"},
     {"oiio_damaged/bad-bbox-huge.vdb", ""},
     {"oiio_damaged/bad-bbox-inverted.vdb", ""},
     {"oiio_damaged/bad-bbox-overflow.vdb", ""},
@@ -164,16 +165,6 @@ TEST_P(RefusedMap, ByItsFault) {
     const Ended r = vdbgeo({"info", file, "--json", "--threads", "2"}, small_memory());
     expect_error(r, 3, file + ": ", GetParam().text);
     expect_small(r);
-}
-
-// A grid without a voxel is one, but nothing can be made of it.
-TEST_F(OtherMaps, AnEmptyGridIsOnlyDescribed) {
-    VDBGEO_NEEDS_DATA("oiio_damaged/bad-bbox-empty.vdb");
-    const std::string grid = (data_folder() / "oiio_damaged/bad-bbox-empty.vdb").string();
-    EXPECT_EQ(json({"info", grid})["active_voxels"], 0);
-    EXPECT_EQ(vdbgeo({"convert", grid, at("a.mrc")}).code, 3);
-    EXPECT_EQ(vdbgeo({"surface", grid, at("a.ply")}).code, 3);
-    EXPECT_TRUE(listing().empty());
 }
 
 // Whatever else lies there under a map's name is read or refused, never a crash.

@@ -4,7 +4,9 @@
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/reports.h"
+#include "apps/stages.h"
 #include "converters/mesh_file.h"
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -32,10 +34,11 @@ void convert_map(const ConvertOptions& o, Session& session) {
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
-    if (is_vdb_ending(o.out))
-        write_vdb({in.map.grid}, o.out, o.vdb, session.stage("writing"));
-    else
-        write_mrc(in.map, o.out, o.mrc, session.stage("writing"));
+    if (in.map.grid->activeVoxelCount() == 0)
+        throw NumericalError(
+            fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
+                        o.in, in.map.statistics.min, in.map.statistics.max));
+    write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();
     Json j{{"in", o.in}, {"out", o.out}};
@@ -54,11 +57,7 @@ void run_convert(const ConvertOptions& o, Session& session) {
     if (is_mesh_ending(o.in)) return convert_mesh(o, session);
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
-    if (!is_vdb_ending(o.out) && !is_map_ending(o.out))
-        throw UsageError(fmt::format(
-            "{}: the ending tells the format: .vdb, .mrc .map .ccp4 .rec, or .ply .obj .off .stl", o.out));
-    if (o.out != "-" && (o.out.size() > 3 && (o.out.substr(o.out.size() - 3) == ".gz")))
-        throw UsageError(fmt::format("{}: maps are written plain; compress the file afterwards", o.out));
+    check_map_output(o.out, session);
     convert_map(o, session);
 }
 
@@ -68,9 +67,10 @@ Command convert_command() {
     return {"convert", "Convert between map (MRC, CCP4), grid (VDB) and mesh files, by their endings",
             "  vdbgeo convert emd_1080.map emd_1080.vdb --threshold 1.5sigma", [](CLI::App& app) {
                 auto o = std::make_shared<ConvertOptions>();
-                app.add_option("in", o->in, "Map, grid or mesh file")->required();
+                app.add_option("in", o->in, "Map, grid or mesh file; - reads a map from a pipe")->required();
                 app.add_option("out", o->out,
-                               "File to write: .vdb; .mrc .map .ccp4 .rec; .ply .obj .off .stl")
+                               "File to write: .vdb; .mrc .map .ccp4 .rec; .ply .obj .off .stl; - is an MRC "
+                               "map for a pipe")
                     ->required();
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);

@@ -35,9 +35,8 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
         j.update(measures_json(measure_mesh(read_mesh(file, progress.part(0, 0.5)), progress.part(0.5, 1))));
     } else {
         j["kind"] = "map";
-        // Statistics first: what is odd about compressed data shows only at its end.
-        const Statistics statistics = mrc_statistics(file, options.map.options, progress);
-        const MrcReader reader(file, options.map.options.mrc);
+        MrcReader reader(file, options.map.options.mrc);
+        const Statistics statistics = mrc_statistics(reader, options.map.options.invert, progress);
         j.update(mrc_json(reader, statistics, reader.warnings()));
         if (options.validate) j["departures"] = validate_mrc(file);
     }
@@ -46,6 +45,9 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
 }
 
 void run_info(const InfoOptions& options, Session& session) {
+    for (const std::string& file : options.files)
+        if (file == "-" && options.validate)
+            throw UsageError("-: --validate reads a file more than once, which a pipe does not allow");
     Json all = Json::array();
     for (const std::string& file : options.files) {
         Json j = describe(file, options, session);

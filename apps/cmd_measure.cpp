@@ -14,6 +14,8 @@ struct MeasureOptions {
 };
 
 void run_measure(const MeasureOptions& o, Session& session) {
+    if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
+        throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
     Json seconds;
     Clock clock;
     const TriMesh mesh = read_mesh(o.in, session.stage("reading"));

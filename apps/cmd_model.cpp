@@ -77,7 +77,8 @@ Json picture_stage(Model& m, const Progress& progress) {
     if (options.title.empty())
         options.title = fmt::format("{}, isovalue {:.4g}", fs::path(m.options.in).filename().string(),
                                     m.surface.isovalue);
-    write_png(render(m.surface.mesh, options, progress), m.out("surface.png"));
+    const Image image = naming(m.options.in, [&] { return render(m.surface.mesh, options, progress); });
+    write_png(image, m.out("surface.png"));
     return {{"files", {"surface.png"}}};
 }
 
@@ -127,7 +128,7 @@ void run_model(const ModelOptions& o, Session& session) {
                  {"versions", versions_json()},
                  {"seconds", all.seconds()},
                  {"stages", stages}};
-    write_file(model.out("summary.json"), summary.dump(2) + "\n");
+    write_file(model.out("summary.json"), json_text(summary, 2) + "\n");
     if (!session.json) {
         session.say(fmt::format("isovalue    {:.6g} ({})", model.surface.isovalue, o.iso.text));
         for (const std::string& line : measures_text(model.measures)) session.say(line);

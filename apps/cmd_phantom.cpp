@@ -21,24 +21,15 @@ std::string kinds_text() {
     return text;
 }
 
-void write_map(const DensityMap& map, const std::string& path, const VdbWriteOptions& vdb,
-               const Progress& progress) {
-    if (is_vdb_ending(path))
-        write_vdb({map.grid}, path, vdb, progress);
-    else
-        write_mrc(map, path, {}, progress);
-}
-
 void run_phantom(const PhantomCommandOptions& o, Session& session) {
-    for (const std::string& path : {o.out, o.truth})
-        if (!path.empty() && !is_vdb_ending(path) && !is_map_ending(path))
-            throw UsageError(
-                fmt::format("{}: the ending tells the format: .vdb or .mrc .map .ccp4 .rec", path));
+    check_map_output(o.out, session);
+    if (!o.truth.empty()) check_map_output(o.truth, session);
+    if (o.truth == o.out) throw UsageError(fmt::format("{}: --truth needs a file of its own", o.truth));
     const Phantom phantom(o.phantom, session.stage("preparing"));
     const DensityMap map = phantom_map(phantom, false, session.stage("evaluating"));
-    write_map(map, o.out, o.vdb, session.stage("writing"));
+    write_map(map, o.out, o.vdb, {}, session.stage("writing"));
     if (!o.truth.empty())
-        write_map(phantom_map(phantom, true, session.stage("truth")), o.truth, o.vdb,
+        write_map(phantom_map(phantom, true, session.stage("truth")), o.truth, o.vdb, {},
                   session.stage("writing"));
     session.end_stage();
     Json j{{"kind", o.phantom.kind},
@@ -76,7 +67,9 @@ Command phantom_command() {
                 app.add_option("--period", p.period, "Period in Å of the gyroid");
                 app.add_option("--snr", p.snr,
                                "Variance inside the particle over the variance of the noise [no noise]");
-                app.add_option("--seed", p.seed, "Seed of the noise")->capture_default_str();
+                app.add_option("--seed", p.seed, "Seed of the noise")
+                    ->check(CLI::NonNegativeNumber.description(""))
+                    ->capture_default_str();
                 app.add_option("--truth", o->truth, "Write the map without noise here too");
                 add_vdb_flags(app, o->vdb);
                 return [o](Session& session) {

@@ -17,19 +17,22 @@ struct RenderCommandOptions {
     RenderOptions render;
 };
 
-TriMesh load(const RenderCommandOptions& o, Session& session) {
+TriMesh load(const RenderCommandOptions& o, const Isovalue& rule, Session& session) {
     if (is_mesh_ending(o.in)) return read_mesh(o.in, session.stage("reading"));
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
-    return extract_surface(o.in, in, o.iso.parse(), session.stage("surface")).mesh;
+    return extract_surface(o.in, in, rule, session.stage("surface")).mesh;
 }
 
 void run_render(const RenderCommandOptions& o, Session& session) {
     if (o.out != "-" && !has_ending(o.out, ".png"))
         throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.out));
+    if (o.out == "-") take_output(session);
+    const Isovalue rule = o.iso.parse();
     Clock clock;
-    const TriMesh mesh = load(o, session);
-    const Image image = render(mesh, o.render, session.stage("rendering"));
+    const TriMesh mesh = load(o, rule, session);
+    const auto progress = session.stage("rendering");
+    const Image image = naming(o.in, [&] { return render(mesh, o.render, progress); });
     write_png(image, o.out);
     session.end_stage();
     session.result(

@@ -29,7 +29,11 @@ void add_common_flags(CLI::App& app, Session& session) {
 }
 
 /// Runs a command's body and turns what it throws into an exit code and one line.
-int guarded(const std::string& program, Session& session, const std::function<void(Session&)>& body) {
+int guarded(Session& session, const std::function<void(Session&)>& body) {
+    const auto failed = [&](int code, const std::string& message) {
+        session.drop_stage();
+        return fail(session.program, code, message);
+    };
     try {
         std::optional<tbb::global_control> limit;
         if (session.threads > 0)
@@ -40,26 +44,20 @@ int guarded(const std::string& program, Session& session, const std::function<vo
         session.end_stage();
         return 0;
     } catch (const UsageError& e) {
-        return fail(program, exit_usage, e.what());
+        return failed(exit_usage, e.what());
     } catch (const InvalidInput& e) {
-        session.end_stage();
-        return fail(program, exit_input, e.what());
+        return failed(exit_input, e.what());
     } catch (const IoError& e) {
-        session.end_stage();
-        return fail(program, exit_io, e.what());
+        return failed(exit_io, e.what());
     } catch (const NumericalError& e) {
-        session.end_stage();
-        return fail(program, exit_computation, e.what());
+        return failed(exit_computation, e.what());
     } catch (const Cancelled& e) {
-        session.end_stage();
-        return fail(program, exit_interrupted, e.what());
+        return failed(exit_interrupted, e.what());
     } catch (const std::bad_alloc&) {
-        session.end_stage();
-        return fail(program, exit_computation,
-                    "out of memory; keep fewer voxels (--threshold) or use a smaller map");
+        return failed(exit_computation,
+                      "out of memory; keep fewer voxels (--threshold) or use a smaller map");
     } catch (const std::exception& e) {
-        session.end_stage();
-        return fail(program, exit_computation, e.what());
+        return failed(exit_computation, e.what());
     }
 }
 
@@ -77,6 +75,7 @@ int run(int argc, char** argv, const std::vector<Command>& commands, const std::
     app.set_version_flag("--version", [] { return versions_text(); });
     app.get_formatter()->column_width(34);
     Session session;
+    session.program = program;
     std::function<void(Session&)> chosen;
     if (single) {
         add_common_flags(app, session);
@@ -103,7 +102,7 @@ int run(int argc, char** argv, const std::vector<Command>& commands, const std::
     }
     if (!chosen)
         return fail(program, exit_usage, fmt::format("a command is needed; {} --help lists them", program));
-    return guarded(program, session, chosen);
+    return guarded(session, chosen);
 }
 
 }  // namespace vdbgeo::app

@@ -17,6 +17,7 @@ std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
         const auto [rest, error] = std::from_chars(at, end, number);
         if (error != std::errc() || (rest != end && *rest != ',')) return {};
         numbers.push_back(number);
+        if (rest != end && rest + 1 == end) return {};  // a comma, and nothing behind it
         at = rest == end ? rest : rest + 1;
     }
     if (numbers.size() == 1 && one_is_enough) return Vec3d::Constant(numbers[0]);
@@ -95,7 +96,7 @@ void MapFlags::finish() {
 void IsoFlag::add(CLI::App& app) {
     app.add_option("--iso", text,
                    "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a "
-                   "level set)")
+                   "level set, half the maximum for a fog volume)")
         ->capture_default_str();
 }
 

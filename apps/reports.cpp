@@ -172,7 +172,7 @@ std::vector<std::string> as_lines(const Json& object) {
         } else if (value.is_string()) {
             lines.push_back(fmt::format("{:<{}}  {}", key, width, value.get<std::string>()));
         } else if (!(value.is_array() && value.empty())) {
-            lines.push_back(fmt::format("{:<{}}  {}", key, width, value.dump()));
+            lines.push_back(fmt::format("{:<{}}  {}", key, width, json_text(value)));
         }
     }
     return lines;

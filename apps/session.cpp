@@ -4,9 +4,12 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <mutex>
+
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -16,6 +19,12 @@ volatile sig_atomic_t interrupted = 0;
 void on_interrupt(int) {
     if (interrupted) _exit(130);  // a second Ctrl-C does not wait
     interrupted = 1;
+}
+
+void print_out(const std::string& text) {
+    errno = 0;
+    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+        throw IoError(fmt::format("standard output: writing failed: {}", std::strerror(errno)));
 }
 
 }  // namespace
@@ -60,6 +69,12 @@ class Session::Bar {
                    terminal_ ? "\033[K" : "");
     }
 
+    void drop() {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (terminal_ && !quiet_ && !ended_) fmt::print(stderr, "\r\033[K");
+        ended_ = true;
+    }
+
  private:
     const std::string name_;
     const bool quiet_, terminal_;
@@ -80,22 +95,34 @@ void Session::end_stage() {
     bar_.reset();
 }
 
+void Session::drop_stage() {
+    if (bar_) bar_->drop();
+    bar_.reset();
+}
+
 void Session::say(const std::string& line) {
     end_stage();
-    fmt::print(json ? stderr : stdout, "{}\n", line);
+    if (json || output_taken)
+        fmt::print(stderr, "{}\n", line);
+    else
+        print_out(line + "\n");
 }
 
 void Session::warn(const std::string& line) {
     end_stage();
-    fmt::print(stderr, "vdbgeo: warning: {}\n", line);
+    fmt::print(stderr, "{}: warning: {}\n", program, line);
 }
 
 void Session::result(const Json& value) {
     end_stage();
-    if (json) fmt::print("{}\n", value.dump(2));
+    if (json) print_out(json_text(value, 2) + "\n");
 }
 
 Session::~Session() { end_stage(); }
+
+std::string json_text(const Json& value, int indent) {
+    return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
 
 void install_interrupt_handler() {
     struct sigaction action {};

@@ -32,19 +32,23 @@ class Clock {
 
 class Session {
  public:
-    bool json = false;   ///< one JSON object on standard output, all else on standard error
-    bool quiet = false;  ///< no progress
-    int threads = 0;     ///< 0: as many as there are
+    std::string program = "vdbgeo";  ///< begins every warning and error
+    bool json = false;               ///< one JSON object on standard output, all else on standard error
+    bool quiet = false;              ///< no progress
+    int threads = 0;                 ///< 0: as many as there are
+    bool output_taken = false;  ///< a file goes to standard output: lines for people go to standard error
 
     /// Progress of one stage: a bar with rate and time left on a terminal, else one line when it ends.
     Progress stage(const std::string& name);
     /// Ends the running stage's line; called by everything that prints.
     void end_stage();
-    /// One line for people: standard output, or standard error with --json.
+    /// Forgets the running stage, which failed: only the error is told.
+    void drop_stage();
+    /// One line for people: standard output, or standard error where that is taken.
     void say(const std::string& line);
     /// One line on standard error.
     void warn(const std::string& line);
-    /// The result. Printed as JSON with --json.
+    /// The result. Printed as JSON with --json. Throws IoError where standard output is full, as `say` does.
     void result(const Json& json);
 
     ~Session();
@@ -53,6 +57,9 @@ class Session {
     class Bar;
     std::shared_ptr<Bar> bar_;
 };
+
+/// JSON as text; what is not UTF-8 in it (names of files can be anything) becomes U+FFFD.
+std::string json_text(const Json& value, int indent = -1);
 
 /// Ctrl-C sets a flag that every progress report looks at.
 void install_interrupt_handler();

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/marching_cubes.h"
 #include "vdbgeo/view/plot.h"
 #include "vdbgeo/view/png.h"
@@ -15,8 +14,10 @@ namespace vdbgeo::app {
 Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
                         const Progress& progress) {
     Surface surface;
-    surface.isovalue = rule.resolve(in.map.statistics, in.level_set);
-    surface.mesh = marching_cubes(in.map, {surface.isovalue}, progress);
+    naming(name, [&] {
+        surface.isovalue = rule.resolve(in.map.statistics, in.map.grid->getGridClass());
+        surface.mesh = marching_cubes(in.map, {surface.isovalue}, progress);
+    });
     if (surface.mesh.empty())
         throw NumericalError(
             fmt::format("{}: no surface at the isovalue {:.6g}: the map's values lie between {:.6g} and "
@@ -25,6 +26,28 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
     if (in.level_set)
         for (Triangle& t : surface.mesh.triangles) std::swap(t[1], t[2]);
     return surface;
+}
+
+void take_output(Session& session) {
+    if (session.json) throw UsageError("-: standard output cannot take both the file and what --json prints");
+    session.output_taken = true;
+}
+
+void check_map_output(const std::string& path, Session& session) {
+    if (path == "-") return take_output(session);
+    for (const char* packed : {".gz", ".bz2", ".zst"})
+        if (has_ending(path, packed))
+            throw UsageError(fmt::format("{}: maps are written plain; compress the file afterwards", path));
+    if (!is_vdb_ending(path) && !is_map_ending(path))
+        throw UsageError(fmt::format("{}: the ending tells the format: .vdb or .mrc .map .ccp4 .rec", path));
+}
+
+void write_map(const DensityMap& map, const std::string& path, const VdbWriteOptions& vdb,
+               const MrcWriteOptions& mrc, const Progress& progress) {
+    if (is_vdb_ending(path))
+        write_vdb({map.grid}, path, vdb, progress);
+    else
+        write_mrc(map, path, mrc, progress);
 }
 
 DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress) {

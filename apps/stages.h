@@ -5,6 +5,8 @@
 
 #include "apps/session.h"
 #include "converters/map_file.h"
+#include "converters/vdb_file.h"
+#include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/volume/isovalue.h"
@@ -17,10 +19,31 @@ struct Surface {
     double isovalue = 0;
 };
 
+/// Runs `body` for the file `name`, which is put before what is found wrong.
+template <class Body>
+auto naming(const std::string& name, const Body& body) -> decltype(body()) {
+    try {
+        return body();
+    } catch (const InvalidInput& e) {
+        throw InvalidInput(name + ": " + e.what());
+    }
+}
+
 /// The surface of a map by marching cubes; of a level set (negative inside) with its faces turned outward.
 /// NumericalError where nothing crosses the isovalue, telling the map's range.
 Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
                         const Progress& progress);
+
+/// For a command that writes a file to standard output; UsageError with --json, which wants it too.
+void take_output(Session& session);
+
+/// UsageError unless a map can be written under this name: .vdb, the endings of map files without those of
+/// compression, or "-", which is an MRC file on standard output.
+void check_map_output(const std::string& path, Session& session);
+
+/// Writes a map in the format that the name tells.
+void write_map(const DensityMap& map, const std::string& path, const VdbWriteOptions& vdb,
+               const MrcWriteOptions& mrc, const Progress& progress);
 
 /// A phantom as a map, with its noise or without.
 DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress);

@@ -57,6 +57,11 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
     SparsifyOptions sparsify = options.sparsify;
     double begin = 0;
     if (options.threshold_sigma) {
+        if (path == "-")
+            throw InvalidInput(
+                "standard input: a threshold in sigma reads the map twice, which a pipe does not allow; give "
+                "a "
+                "value");
         const Statistics s = mrc_statistics(path, options, progress.part(0, 0.5));
         sparsify.threshold = static_cast<float>(s.mean + *options.threshold_sigma * s.rms);
         begin = 0.5;
@@ -109,9 +114,13 @@ MapFile read_map(const fs::path& path, const MapReadOptions& options, const Prog
 
 Statistics mrc_statistics(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     MrcReader reader(path, options.mrc);
+    return mrc_statistics(reader, options.invert, progress);
+}
+
+Statistics mrc_statistics(MrcReader& reader, bool invert, const Progress& progress) {
     SparsifyOptions nothing;  // keeps no sample: only the statistics are wanted
     nothing.threshold = std::numeric_limits<float>::max();
-    return stream(reader, nothing, options.invert, progress).statistics;
+    return stream(reader, nothing, invert, progress).statistics;
 }
 
 bool is_map_ending(const fs::path& path) {

@@ -45,6 +45,10 @@ MapFile read_map(const std::filesystem::path& path, const MapReadOptions& option
 Statistics mrc_statistics(const std::filesystem::path& path, const MapReadOptions& options = {},
                           const Progress& progress = {});
 
+/// The same of the sections that `reader` has left; what is odd about compressed data, which shows only at
+/// its end, is in reader.warnings() afterwards. Reads a pipe too.
+Statistics mrc_statistics(MrcReader& reader, bool invert = false, const Progress& progress = {});
+
 /// Endings that are taken for maps: .mrc .map .ccp4 .rec .st .mrcs and so on, each also with .gz, .bz2, .zst.
 bool is_map_ending(const std::filesystem::path& path);
 bool is_vdb_ending(const std::filesystem::path& path);

@@ -40,16 +40,20 @@ struct VdbGridInfo {
 /// Whether a file begins with the signature of a VDB file.
 bool is_vdb_file(const std::filesystem::path& path);
 
-/// The grids of a VDB file.
+/// The grids of a VDB file, of any type. File formats 222 (OpenVDB 3) to 224; files that were written to a
+/// pipe too, where all grids are of float, double, int32, int64 or their vectors.
 ///
-/// Before OpenVDB loads anything the file's skeleton is walked: signature, version, every length and offset
-/// against the file's size, no missing tail; bounding boxes and voxel counts in the metadata must be
-/// plausible. Throws InvalidInput naming the fault and the grid, IoError where the file cannot be read.
+/// The file's skeleton is walked before anything is taken from it: signature, version, every length and
+/// offset against the file's size, no missing tail; bounding boxes in the metadata must be plausible. Throws
+/// InvalidInput naming the fault and the grid, IoError where the file cannot be read.
 std::vector<VdbGridInfo> list_vdb(const std::filesystem::path& path);
 
 /// Reads one grid of floats: the one called `name`; unset: "density", else the first grid of floats. Checked
-/// as by list_vdb, and the loaded tree against its metadata. Throws InvalidInput also where there is no such
-/// grid.
+/// as by list_vdb; then its tree is walked, every mask and block, before OpenVDB makes nodes of it, voxels are
+/// decompressed on all threads, and what was loaded is compared with the bounding box and the voxel count of
+/// the metadata. A grid without an active voxel is refused unless its metadata say so. Throws InvalidInput
+/// also where there is no such grid and where its transform is not linear. Memory: at most 35 times the bytes
+/// of the file, however it is damaged. Notes for delayed loading are dropped from the metadata.
 openvdb::FloatGrid::Ptr read_vdb(const std::filesystem::path& path,
                                  const std::optional<std::string>& name = {});
 

@@ -1,151 +1,66 @@
 #include <fmt/format.h>
+#include <openvdb/io/io.h>
 
-#include <cerrno>
-#include <cstring>
+#include <algorithm>
 #include <fstream>
+#include <streambuf>
 
 #include "converters/vdb_file.h"
+#include "converters/vdb_skeleton.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
 
 namespace vdbgeo {
 namespace {
 
 namespace fs = std::filesystem;
-using openvdb::Vec3i;
+using openvdb::FloatGrid;
+using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr std::uint32_t oldest_version = 222;  // node masks: everything since OpenVDB 3
-constexpr std::uint32_t newest_version = openvdb::OPENVDB_FILE_VERSION;
-
-/// Reads the skeleton of a file, with every length checked against what is left of it.
-class Skeleton {
+/// A stream over bytes in memory that knows what OpenVDB wants to know of a file.
+class ByteStream : public std::istream {
  public:
-    explicit Skeleton(const fs::path& path) : name_(path.string()), in_(path, std::ios::binary) {
-        std::error_code error;
-        if (fs::is_directory(path, error)) throw IoError(name_ + ": is a directory");
-        if (!in_) throw IoError(fmt::format("{}: cannot be opened: {}", name_, std::strerror(errno)));
-        size_ = static_cast<std::uint64_t>(fs::file_size(path, error));
-        if (error) throw IoError(fmt::format("{}: {}", name_, error.message()));
+    ByteStream(const VdbSkeleton& skeleton, const VdbEntry& entry, std::string_view bytes)
+        : std::istream(nullptr), buffer_(bytes) {
+        rdbuf(&buffer_);
+        namespace io = openvdb::io;
+        io::setVersion(*this, {skeleton.library_major, skeleton.library_minor}, skeleton.version);
+        io::setDataCompression(*this, entry.compression);
     }
 
-    [[noreturn]] void fail(const std::string& what) const {
-        throw InvalidInput(fmt::format("{}: damaged VDB file: {} (byte {} of {})", name_, what, at_, size_));
-    }
-
-    /// Walks the header, the file's metadata, and every grid's descriptor; the metadata of the grids comes
-    /// back.
-    std::vector<VdbGridInfo> walk() {
-        if (number<std::uint64_t>("signature") != openvdb::OPENVDB_MAGIC)
-            throw InvalidInput(name_ + ": not a VDB file: it does not begin with the signature ' BDV'");
-        const auto version = number<std::uint32_t>("file version");
-        if (version < oldest_version || version > newest_version)
-            fail(fmt::format("file format version {}, {} to {} can be read", version, oldest_version,
-                             newest_version));
-        number<std::uint32_t>("library version");
-        number<std::uint32_t>("library version");
-        const auto offsets = number<std::uint8_t>("offsets flag");
-        if (offsets > 1) fail(fmt::format("the flag for grid offsets is {}, not 0 or 1", offsets));
-        skip(36, "identifier");
-        metadata("the file");
-        const auto count = number<std::int32_t>("number of grids");
-        if (count < 1 || count > 100000) fail(fmt::format("{} grids", count));
-        std::vector<VdbGridInfo> grids;
-        if (!offsets) return grids;  // written to a pipe: no way to look ahead
-        for (int g = 0; g < count; ++g) grids.push_back(grid(g));
-        if (at_ != size_) fail(fmt::format("{} bytes behind the last grid", size_ - at_));
-        return grids;
-    }
+    /// Bytes read so far.
+    std::uint64_t position() const { return buffer_.position(); }
 
  private:
-    VdbGridInfo grid(int number_of_grid) {
-        VdbGridInfo info;
-        info.name = string(fmt::format("name of grid {}", number_of_grid));
-        info.name = info.name.substr(0, info.name.find('\x1e'));  // the writer's suffix for equal names
-        info.type = string("type of grid '" + info.name + "'");
-        const std::string parent = string("instance parent");
-        const auto grid_at = number<std::int64_t>("grid offset"),
-                   block_at = number<std::int64_t>("block offset"),
-                   end_at = number<std::int64_t>("end offset");
-        const auto here = static_cast<std::int64_t>(at_), end = static_cast<std::int64_t>(size_);
-        if (grid_at != here || block_at < grid_at || end_at < block_at || end_at > end)
-            fail(fmt::format(
-                "grid '{}' claims bytes {} to {} with its voxels from {}: the file is cut off or its offsets "
-                "are wrong",
-                info.name, grid_at, end_at, block_at));
-        number<std::uint32_t>("compression of grid '" + info.name + "'");
-        info.metadata = metadata("grid '" + info.name + "'");
-        if (at_ > static_cast<std::uint64_t>(end_at)) fail("the metadata runs beyond the end of its grid");
-        seek(static_cast<std::uint64_t>(end_at));
-        return info;
-    }
-
-    openvdb::MetaMap metadata(const std::string& whose) {
-        const std::uint64_t begin = at_;
-        const auto count = number<std::uint32_t>("number of metadata entries");
-        if (count > (size_ - at_) / 12) fail(fmt::format("{} metadata entries of {}", count, whose));
-        for (std::uint32_t i = 0; i < count; ++i) {
-            string("name of a metadata entry");
-            string("type of a metadata entry");
-            skip(number<std::uint32_t>("length of a metadata entry"), "metadata entry");
+    struct Buffer : std::streambuf {
+        std::uint64_t position() const { return static_cast<std::uint64_t>(gptr() - eback()); }
+        explicit Buffer(std::string_view bytes) {
+            char* begin = const_cast<char*>(bytes.data());  // never written to: there is no put area
+            setg(begin, begin, begin + bytes.size());
         }
-        const std::uint64_t end = at_;
-        seek(begin);
-        openvdb::MetaMap map;
-        try {
-            map.readMeta(in_);
-        } catch (const openvdb::Exception& e) {
-            fail(fmt::format("the metadata of {} cannot be read: {}", whose, e.what()));
-        }
-        seek(end);
-        return map;
-    }
+    } buffer_;
+};
 
-    template <class T>
-    T number(const std::string& what) {
-        T value{};
-        need(sizeof value, what);
-        in_.read(reinterpret_cast<char*>(&value), sizeof value);
-        if (!in_) fail("cannot be read");
-        at_ += sizeof value;
-        return value;
-    }
+/// What the writer noted of a grid's active voxels; not every writer does.
+struct NotedVoxels {
+    explicit NotedVoxels(const openvdb::MetaMap& metadata)
+        : low(metadata.getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN)),
+          high(metadata.getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX)),
+          count(metadata.getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT)) {}
 
-    std::string string(const std::string& what) {
-        const auto length = number<std::uint32_t>(what);
-        need(length, what);
-        std::string text(length, '\0');
-        in_.read(text.data(), length);
-        at_ += length;
-        return text;
-    }
+    bool none() const { return count && count->value() == 0; }
 
-    void need(std::uint64_t bytes, const std::string& what) const {
-        if (bytes > size_ - at_) fail(fmt::format("the file ends inside: {} ({} bytes needed)", what, bytes));
-    }
-
-    void skip(std::uint64_t bytes, const std::string& what) {
-        need(bytes, what);
-        seek(at_ + bytes);
-    }
-
-    void seek(std::uint64_t position) {
-        in_.clear();
-        in_.seekg(static_cast<std::streamoff>(position));
-        at_ = position;
-    }
-
-    std::string name_;
-    std::ifstream in_;
-    std::uint64_t size_ = 0, at_ = 0;
+    openvdb::Vec3IMetadata::ConstPtr low, high;
+    openvdb::Int64Metadata::ConstPtr count;
 };
 
 /// The bounding box that the writer noted has to be a box of plausible size.
 void check_noted_box(const std::string& file, const VdbGridInfo& grid) {
-    const auto low = grid.metadata.getMetadata<openvdb::Vec3IMetadata>("file_bbox_min");
-    const auto high = grid.metadata.getMetadata<openvdb::Vec3IMetadata>("file_bbox_max");
-    if (!low || !high) return;
+    const NotedVoxels noted(grid.metadata);
+    if (!noted.low || !noted.high || noted.none()) return;
     constexpr std::int64_t furthest = std::int64_t(1) << 30;
     for (int a = 0; a < 3; ++a) {
-        const std::int64_t from = low->value()[a], to = high->value()[a];
+        const std::int64_t from = noted.low->value()[a], to = noted.high->value()[a];
         if (from > to)
             throw InvalidInput(
                 fmt::format("{}: grid '{}': its bounding box is empty or inverted along axis {}: {} to {}",
@@ -157,38 +72,74 @@ void check_noted_box(const std::string& file, const VdbGridInfo& grid) {
     }
 }
 
-void check_loaded(const std::string& file, const openvdb::FloatGrid& grid) {
+void check_loaded(const std::string& file, const FloatGrid& grid) {
+    const NotedVoxels noted(grid);
+    const std::uint64_t count = grid.activeVoxelCount();
+    if (count == 0 && !noted.none())
+        throw InvalidInput(fmt::format("{}: grid '{}' holds no voxel{}", file, grid.getName(),
+                                       noted.low ? ", though its metadata tells of a bounding box" : ""));
+    if (noted.count && static_cast<std::uint64_t>(noted.count->value()) != count)
+        throw InvalidInput(fmt::format("{}: grid '{}' holds {} active voxels, not the {} of its metadata",
+                                       file, grid.getName(), count, noted.count->value()));
+    if (count == 0 || !noted.low || !noted.high) return;
     const auto box = grid.evalActiveVoxelBoundingBox();
-    const auto low = grid.getMetadata<openvdb::Vec3IMetadata>("file_bbox_min");
-    const auto high = grid.getMetadata<openvdb::Vec3IMetadata>("file_bbox_max");
-    if (!low || !high || (box.empty() && low->value() == high->value())) return;
-    if (box.empty())
-        throw InvalidInput(
-            fmt::format("{}: grid '{}' holds no voxel, though its metadata tells of a bounding box", file,
-                        grid.getName()));
-    if (low->value() != box.min().asVec3i() || high->value() != box.max().asVec3i())
+    if (noted.low->value() != box.min().asVec3i() || noted.high->value() != box.max().asVec3i())
         throw InvalidInput(
             fmt::format("{}: grid '{}': its voxels do not fill the bounding box that its metadata tells of",
                         file, grid.getName()));
 }
 
-std::string choose(const std::string& file, const std::vector<VdbGridInfo>& grids,
-                   const std::optional<std::string>& name) {
-    const std::string float_type = openvdb::FloatGrid::gridType();
-    const VdbGridInfo* chosen = nullptr;
-    for (const VdbGridInfo& g : grids) {
-        if (name && g.name != *name) continue;
-        const bool floats = g.type.substr(0, float_type.size()) == float_type;
-        if (name && !floats)
-            throw InvalidInput(fmt::format("{}: grid '{}' holds {}, not floats", file, g.name, g.type));
-        if (floats && (!chosen || (g.name == "density" && chosen->name != "density"))) chosen = &g;
+const VdbEntry& choose(const std::string& file, const std::vector<VdbEntry>& grids,
+                       const std::optional<std::string>& name) {
+    const std::string floats = FloatGrid::gridType();
+    const VdbEntry* chosen = nullptr;
+    const VdbEntry* other = nullptr;  // of that name, but of another type
+    for (const VdbEntry& g : grids) {
+        if (name && g.info.name != *name) continue;
+        if (g.info.type != floats && g.info.type != floats + "_HalfFloat")
+            other = &g;
+        else if (!chosen || (g.info.name == "density" && chosen->info.name != "density"))
+            chosen = &g;
     }
-    if (chosen) return chosen->name;
+    if (chosen) return *chosen;
+    if (name && other)
+        throw InvalidInput(fmt::format("{}: grid '{}' holds {}, not floats", file, *name, other->info.type));
     std::string names;
-    for (const VdbGridInfo& g : grids)
-        names += fmt::format("{}'{}' ({})", names.empty() ? "" : ", ", g.name, g.type);
+    for (const VdbEntry& g : grids)
+        names += fmt::format("{}'{}' ({})", names.empty() ? "" : ", ", g.info.name, g.info.type);
     throw InvalidInput(name ? fmt::format("{}: no grid '{}' among {}", file, *name, names)
                             : fmt::format("{}: no grid of floats among {}", file, names));
+}
+
+/// The grid whose tree `entry` has: itself, or the one that it is an instance of.
+const VdbEntry& owner_of(VdbCursor& cursor, const std::vector<VdbEntry>& grids, const VdbEntry& entry) {
+    if (entry.parent.empty()) return entry;
+    for (const VdbEntry& g : grids)
+        if (g.unique_name == entry.parent && g.parent.empty() && g.info.type == entry.info.type) return g;
+    cursor.fail(
+        fmt::format("grid '{}' shares the tree of '{}', which is not there", entry.info.name, entry.parent));
+}
+
+/// Makes the tree out of bytes that check_vdb_tree has gone through; the voxels on all threads.
+void load_tree(VdbCursor& cursor, const VdbSkeleton& skeleton, const VdbEntry& entry, FloatGrid& grid) {
+    const VdbTreeLayout layout = check_vdb_tree(cursor, entry);
+    ByteStream in(skeleton, entry, cursor.from(layout.tree_at));
+    grid.tree().readTopology(in, entry.half);
+    std::vector<Leaf*> leaves;
+    leaves.reserve(layout.leaves);
+    grid.tree().getNodes(leaves);  // depth first, as they lie in the file
+    if (!in || leaves.size() != layout.leaves) cursor.fail("the nodes cannot be read");
+    const float background = grid.background();
+    parallel_for(layout.chunk_at.size(), 1, [&](std::size_t c) {
+        ByteStream buffers(skeleton, entry, cursor.from(layout.chunk_at[c]));
+        openvdb::io::setGridBackgroundValuePtr(buffers, &background);
+        const std::size_t begin = c * VdbTreeLayout::chunk,
+                          end = std::min<std::size_t>(begin + VdbTreeLayout::chunk, leaves.size());
+        for (std::size_t i = begin; i < end; ++i) leaves[i]->readBuffers(buffers, entry.half);
+        const std::uint64_t last = c + 1 < layout.chunk_at.size() ? layout.chunk_at[c + 1] : cursor.at();
+        const std::uint64_t expected = last - layout.chunk_at[c];
+        if (!buffers || buffers.position() != expected) cursor.fail("the voxels cannot be read");
+    });
 }
 
 }  // namespace
@@ -203,28 +154,37 @@ bool is_vdb_file(const fs::path& path) {
 }
 
 std::vector<VdbGridInfo> list_vdb(const fs::path& path) {
-    std::vector<VdbGridInfo> grids = Skeleton(path).walk();
-    for (const VdbGridInfo& grid : grids) check_noted_box(path.string(), grid);
+    openvdb::initialize();  // registers the types of metadata and transforms; done once
+    const MappedFile file(path);
+    VdbCursor cursor(file);
+    std::vector<VdbGridInfo> grids;
+    for (VdbEntry& entry : walk_vdb(cursor).grids) {
+        check_noted_box(file.name(), entry.info);
+        grids.push_back(std::move(entry.info));
+    }
     return grids;
 }
 
-openvdb::FloatGrid::Ptr read_vdb(const fs::path& path, const std::optional<std::string>& name) {
-    std::vector<VdbGridInfo> grids = list_vdb(path);
+FloatGrid::Ptr read_vdb(const fs::path& path, const std::optional<std::string>& name) {
+    openvdb::initialize();
+    const MappedFile file(path);
+    VdbCursor cursor(file);
+    const VdbSkeleton skeleton = walk_vdb(cursor);
+    for (const VdbEntry& entry : skeleton.grids) check_noted_box(file.name(), entry.info);
+    const VdbEntry& entry = choose(file.name(), skeleton.grids, name);
+    cursor.enter("'" + entry.info.name + "'");
+    const VdbEntry& owner = owner_of(cursor, skeleton.grids, entry);
     try {
-        openvdb::io::File file(path.string());
-        file.setCopyMaxBytes(0);
-        file.open(false);     // no delayed loading: a fault shows now, not in the middle of a computation
-        if (grids.empty()) {  // written to a pipe: everything is loaded by now
-            for (auto it = file.beginName(); it != file.endName(); ++it)
-                grids.push_back({*it, file.readGridMetadata(*it)->type(), {}});
-        }
-        auto grid =
-            openvdb::GridBase::grid<openvdb::FloatGrid>(file.readGrid(choose(path.string(), grids, name)));
-        if (!grid) throw InvalidInput(path.string() + ": the grid does not hold floats");
-        check_loaded(path.string(), *grid);
+        const auto grid = FloatGrid::create();
+        static_cast<openvdb::MetaMap&>(*grid) = entry.info.metadata;
+        if (&owner != &entry) check_vdb_tree(cursor, entry);
+        load_tree(cursor, skeleton, owner, *grid);
+        ByteStream transform(skeleton, entry, cursor.from(entry.transform_at));
+        grid->readTransform(transform);
+        check_loaded(file.name(), *grid);
         return grid;
     } catch (const openvdb::Exception& e) {
-        throw InvalidInput(fmt::format("{}: damaged VDB file: {}", path.string(), e.what()));
+        cursor.fail(e.what());
     }
 }
 

@@ -38,16 +38,13 @@ class ParallelGrid : public FloatGrid {
             next = std::min(begin + chunk, leaves.size());
             return begin;
         };
+        const std::uint32_t compression = openvdb::io::getDataCompression(os);
+        const std::uint32_t grid_class = openvdb::io::getGridClass(os);
+        const float background = constTree().background();
         const auto serialise = [&](std::size_t begin) {
             std::ostringstream out(std::ios::binary);
-            // A copy of what the stream knows: the setters below write into it.
-            const auto shared = openvdb::io::getStreamMetadataPtr(os);
-            auto known = std::make_shared<openvdb::io::StreamMetadata>();
-            if (shared) *known = *shared;
-            openvdb::io::setStreamMetadataPtr(out, known, false);
-            openvdb::io::setDataCompression(out, openvdb::io::getDataCompression(os));
-            openvdb::io::setGridClass(out, openvdb::io::getGridClass(os));
-            const float background = constTree().background();
+            openvdb::io::setDataCompression(out, compression);
+            openvdb::io::setGridClass(out, grid_class);
             openvdb::io::setGridBackgroundValuePtr(out, &background);
             for (std::size_t i = begin; i < std::min(begin + chunk, leaves.size()); ++i)
                 leaves[i]->writeBuffers(out, half);
@@ -104,6 +101,7 @@ void replace_identifier(std::ostream& os, const openvdb::GridCPtrVec& grids) {
 void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std::filesystem::path& path,
                const VdbWriteOptions& options, const Progress& progress) {
     options.check();
+    openvdb::initialize();
     std::uint32_t flags = openvdb::io::COMPRESS_ACTIVE_MASK;
     if (options.compression == VdbWriteOptions::Compression::zip) flags |= openvdb::io::COMPRESS_ZIP;
     if (options.compression == VdbWriteOptions::Compression::blosc) flags |= openvdb::io::COMPRESS_BLOSC;
@@ -116,13 +114,14 @@ void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std:
             grid = std::make_shared<ParallelGrid>(*floats, progress.part(from, to));
         else
             grid = std::const_pointer_cast<openvdb::GridBase>(grids[g]->copyGrid());
-        grid->setSaveFloatAsHalf(options.half);
+        if (grid->saveFloatAsHalf() != options.half) grid->setSaveFloatAsHalf(options.half);
         prepared.push_back(grid);
     }
     AtomicFile file(path);
     Writer writer;
     writer.setCompression(flags);
     try {
+        file.stream().seekp(0);  // fails at once for a pipe
         writer.write_to(file.stream(), prepared);
         replace_identifier(file.stream(), prepared);
     } catch (const openvdb::Exception& e) {
@@ -130,8 +129,8 @@ void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std:
     } catch (const std::ios_base::failure&) {
         throw IoError(fmt::format("{}: a VDB file cannot be written to a pipe", path.string()));
     }
+    progress.report(1);  // the last chance to cancel
     file.commit();
-    progress.report(1);
 }
 
 }  // namespace vdbgeo

@@ -98,6 +98,56 @@ TEST(Render, ASphereIsADiscAndTheRestIsBackground) {
     EXPECT_LT(s.right, 599);
 }
 
+/// Largest difference of brightness (0…1) of two pictures of a ball inside 0.93 of its radius, and of the
+/// steps from a pixel to the next along the rows.
+std::pair<double, double> shading_difference(const Image& a, const Image& b) {
+    const Silhouette s = silhouette(b);
+    const double x0 = (s.left + s.right) / 2.0, y0 = (s.top + s.bottom) / 2.0, r = 0.93 * s.width() / 2;
+    const auto difference = [&](int x, int y) { return (colour_at(a, x, y) - colour_at(b, x, y)).mean(); };
+    double level = 0, step = 0;
+    for (int y = s.top; y <= s.bottom; ++y)
+        for (int x = s.left; x < s.right; ++x) {
+            if (std::max(std::hypot(x - x0, y - y0), std::hypot(x + 1 - x0, y - y0)) > r) continue;
+            const double here = difference(x, y);
+            level = std::max(level, std::abs(here));
+            step = std::max(step, std::abs(difference(x + 1, y) - here));
+        }
+    return {level, step};
+}
+
+/// A ball of triangles between parallels, every second band of them `thin` times as wide as its neighbours.
+TriMesh banded_ball(int bands, int columns, double thin) {
+    std::vector<double> angles{0.02};
+    const double wide = (M_PI - 0.04) / (0.5 * bands * (1 + thin));
+    for (int i = 0; i < bands; ++i) angles.push_back(angles.back() + wide * (i % 2 ? thin : 1));
+    return ring_mesh(bands + 1, columns, false, [&](int row, int column) {
+        const double a = M_PI - angles[static_cast<std::size_t>(row)], b = 2 * M_PI * column / columns;
+        return Vec3d(10 * std::sin(a) * std::cos(b), 10 * std::sin(a) * std::sin(b), 10 * std::cos(a));
+    });
+}
+
+TEST(Render, ACoarseBallIsShadedLikeAFineOne) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 500);
+    options.outline = false;
+    options.occlusion_rays = 6;
+    const auto [level, step] =
+        shading_difference(render(icosphere(3, 10), options), render(icosphere(6, 10), options));
+    EXPECT_LT(level, 0.012);
+    EXPECT_LT(step, 0.008);
+}
+
+TEST(Render, SkinnyTrianglesDoNotShow) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 500);
+    options.outline = false;
+    options.occlusion_rays = 6;
+    const auto [level, step] = shading_difference(render(banded_ball(40, 48, 0.05), options),
+                                                  render(banded_ball(200, 240, 1), options));
+    EXPECT_LT(level, 0.012);
+    EXPECT_LT(step, 0.008);
+}
+
 TEST(Render, ATorusFromTheTopHasItsHole) {
     NEEDS_EMBREE();
     RenderOptions options = bare("top", 500);

@@ -48,16 +48,18 @@ struct Sums {
 
 bool degenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
+/// The mean of the faces' corners: points that no face uses may lie anywhere.
 Vec3d centre_of(const TriMesh& mesh) {
     const Vec3d sum = fixed_order_reduce(
-        mesh.points.size(), block, Vec3d(Vec3d::Zero()),
+        mesh.triangles.size(), block, Vec3d(Vec3d::Zero()),
         [&](std::size_t begin, std::size_t end) {
             Vec3d s = Vec3d::Zero();
-            for (std::size_t i = begin; i < end; ++i) s += mesh.points[i].cast<double>();
+            for (std::size_t f = begin; f < end; ++f)
+                for (const VertexId v : mesh.triangles[f]) s += mesh.points[v].cast<double>();
             return s;
         },
         [](Vec3d& all, const Vec3d& part) { all += part; });
-    return mesh.points.empty() ? sum : Vec3d(sum / static_cast<double>(mesh.points.size()));
+    return sum / (3 * static_cast<double>(mesh.triangles.size()));
 }
 
 void add_angle(Sums& sums, double angle) {
@@ -67,11 +69,12 @@ void add_angle(Sums& sums, double angle) {
     ++sums.histogram[static_cast<std::size_t>(std::min(179.0, angle))];
 }
 
-void add_face(Sums& sums, const std::array<Vec3d, 3>& p) {
+void add_face(Sums& sums, const std::array<Vec3d, 3>& p, const Vec3d& centre) {
+    // Differences of floats are exact in double; those of centred points are not, and needles would show it.
     const Vec3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
     const double twice_area = normal.norm();
     sums.area += 0.5 * twice_area;
-    sums.volume += p[0].dot(normal) / 6;
+    sums.volume += (p[0] - centre).dot(normal) / 6;
     if (twice_area == 0) {
         for (const double angle : {0.0, 0.0, 180.0}) add_angle(sums, angle);
         return;
@@ -88,9 +91,8 @@ Sums sum_faces(const TriMesh& mesh) {
             Sums s;
             for (std::size_t f = begin; f < end; ++f) {
                 std::array<Vec3d, 3> p;
-                for (std::size_t k = 0; k < 3; ++k)
-                    p[k] = mesh.points[mesh.triangles[f][k]].cast<double>() - centre;
-                add_face(s, p);
+                for (std::size_t k = 0; k < 3; ++k) p[k] = mesh.points[mesh.triangles[f][k]].cast<double>();
+                add_face(s, p, centre);
             }
             return s;
         },
@@ -104,13 +106,17 @@ Sums sum_faces(const TriMesh& mesh) {
         });
 }
 
+constexpr std::uint64_t no_edge = ~std::uint64_t(0);  // sorts last; no vertex has the number 2^32 - 1
+
+/// The sides of all faces, edge by edge; those of degenerate faces come last, as no_edge.
 Array<Side> sorted_sides(const TriMesh& mesh) {
     Array<Side> sides(3 * mesh.triangles.size());
     parallel_for(mesh.triangles.size(), block, [&](std::size_t f) {
         const Triangle& t = mesh.triangles[f];
         for (std::size_t k = 0; k < 3; ++k) {
             const std::uint64_t a = t[k], b = t[(k + 1) % 3];
-            sides[3 * f + k] = {std::min(a, b) << 32 | std::max(a, b), 3 * f + k};
+            const std::uint64_t edge = degenerate(t) ? no_edge : std::min(a, b) << 32 | std::max(a, b);
+            sides[3 * f + k] = {edge, 3 * f + k};
         }
     });
     tbb::parallel_sort(sides.begin(), sides.end());
@@ -126,7 +132,7 @@ void visit_edges(const TriMesh& mesh, MeshMeasures& m, DisjointSets& fans) {
             if (mesh.triangles[face][k] == v) return 3 * face + k;
         return corner;
     };
-    for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
+    for (std::size_t begin = 0, end; begin < sides.size() && sides[begin].edge != no_edge; begin = end) {
         for (end = begin; end < sides.size() && sides[end].edge == sides[begin].edge; ++end) {
         }
         ++m.edges;
@@ -152,7 +158,10 @@ void count_topology(const TriMesh& mesh, MeshMeasures& m) {
     std::vector<std::uint8_t> used(mesh.points.size(), 0), fans_of(mesh.points.size(), 0);
     for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
         const Triangle& t = mesh.triangles[f];
-        m.degenerate_faces += degenerate(t);
+        if (degenerate(t)) {
+            ++m.degenerate_faces;
+            continue;
+        }
         for (std::size_t k = 0; k < 3; ++k) {
             used[t[k]] = 1;
             pieces.join(t[0], t[k]);
@@ -167,7 +176,7 @@ void count_topology(const TriMesh& mesh, MeshMeasures& m) {
     }
     m.unused_vertices = m.vertices - used_count;
     m.euler_characteristic = static_cast<std::int64_t>(used_count) - static_cast<std::int64_t>(m.edges) +
-                             static_cast<std::int64_t>(m.faces);
+                             static_cast<std::int64_t>(m.faces - m.degenerate_faces);
 }
 
 }  // namespace
@@ -179,10 +188,10 @@ MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress) {
     m.faces = mesh.triangles.size();
     count_topology(mesh, m);
     progress.report(0.8);
-    m.closed = m.faces > 0 && m.boundary_edges == 0 && m.non_manifold_edges == 0;
+    m.closed = m.faces > m.degenerate_faces && m.boundary_edges == 0 && m.non_manifold_edges == 0;
     m.oriented = m.misoriented_edges == 0;
     m.manifold = m.non_manifold_edges == 0 && m.non_manifold_vertices == 0 && m.degenerate_faces == 0;
-    if (m.closed && m.manifold)
+    if (m.closed && m.manifold && m.oriented)
         m.genus = (2 * static_cast<std::int64_t>(m.components) - m.euler_characteristic) / 2;
     if (m.faces == 0) return m;
     const Sums sums = sum_faces(mesh);

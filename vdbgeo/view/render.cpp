@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -71,6 +72,28 @@ struct Model {
     const Array<Triangle>* triangles = nullptr;
 };
 
+/// Sums of the facets' normals e × f / (|e|² |f|²) over the corners with edges e and f (Max 1999), which is
+/// exact on a sphere and lets the skinny triangles of marching cubes have their say: by area the large ones
+/// beside them win, and the faces show. A point without area round it keeps zero.
+Vec3fs vertex_normals(const Model& model) {
+    constexpr double floor = 1e-10;  // edges under 1e-5 radii are too short for single precision
+    std::vector<Vec3d> sums(model.points.size(), Vec3d::Zero());
+    for (const Triangle& t : *model.triangles) {
+        const Vec3d a = model.points[t[0]].cast<double>(), ab = model.points[t[1]].cast<double>() - a,
+                    ac = model.points[t[2]].cast<double>() - a;
+        const Vec3d cross = ab.cross(ac);
+        const double c2 = ab.squaredNorm() + floor, b2 = ac.squaredNorm() + floor,
+                     a2 = (ac - ab).squaredNorm() + floor;
+        sums[t[0]] += cross / (b2 * c2);
+        sums[t[1]] += cross / (a2 * c2);
+        sums[t[2]] += cross / (a2 * b2);
+    }
+    Vec3fs normals(sums.size());
+    parallel_for(sums.size(), 4096,
+                 [&](std::size_t i) { normals[i] = sums[i].stableNormalized().cast<float>(); });
+    return normals;
+}
+
 Model make_model(const TriMesh& mesh) {
     Model model;
     Vec3d low = Vec3d::Constant(1e300), high = -low;
@@ -87,16 +110,7 @@ Model make_model(const TriMesh& mesh) {
     parallel_for(mesh.points.size(), 4096, [&](std::size_t i) {
         model.points[i] = ((mesh.points[i].cast<double>() - model.centre) / model.radius).cast<float>();
     });
-    model.normals.assign(mesh.points.size(), Vec3f::Zero());
-    for (const Triangle& t : mesh.triangles) {
-        const Vec3f& a = model.points[t[0]];
-        const Vec3f normal = (model.points[t[1]] - a).cross(model.points[t[2]] - a);
-        for (const VertexId v : t) model.normals[v] += normal;
-    }
-    parallel_for(model.normals.size(), 4096, [&](std::size_t i) {
-        const float length = model.normals[i].norm();
-        if (length > 0) model.normals[i] /= length;
-    });
+    model.normals = vertex_normals(model);
     return model;
 }
 
@@ -173,8 +187,9 @@ class RayCaster {
 
     static constexpr int packet = 8;
 
-    /// How many of `count` ≤ packet rays from one point meet something before their length.
-    int blocked(const Vec3f& origin, const Vec3f* directions, const float* lengths, int count) const {
+    /// For each of `count` ≤ packet rays from one point, whether it meets something before its length.
+    std::array<bool, packet> blocked(const Vec3f& origin, const Vec3f* directions, const float* lengths,
+                                     int count) const {
         RTCRay8 rays{};
         alignas(32) int valid[packet];
         for (int i = 0; i < packet; ++i) {
@@ -189,8 +204,8 @@ class RayCaster {
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
         rtcOccluded8(valid, scene_, &context, &rays);
-        int result = 0;
-        for (int i = 0; i < count; ++i) result += rays.tfar[i] < 0;
+        std::array<bool, packet> result{};
+        for (int i = 0; i < count; ++i) result[static_cast<std::size_t>(i)] = rays.tfar[i] < 0;
         return result;
     }
 
@@ -223,15 +238,19 @@ struct Sample {
 const Vec3f key_light = Vec3f(-0.54f, 0.62f, 0.57f).normalized();
 const Vec3f fill_light = Vec3f(0.75f, -0.15f, 0.64f).normalized();
 constexpr float occlusion_reach = 0.5f;  // of the mesh's radius
+constexpr int shadow_rays = 2;           // a sample
+constexpr float light_radius = 0.2f;     // of the key light's disc, at distance 1
 constexpr float ray_offset = 2e-5f;      // of the mesh's radius: some 100 units in the last place
 
-/// A well mixed number in [0, 1) from four integers.
-float noise(std::uint32_t x, std::uint32_t y, std::uint32_t i, std::uint32_t stream) {
+/// Three well mixed numbers in [0, 1) from four integers.
+std::array<float, 3> noise(std::uint32_t x, std::uint32_t y, std::uint32_t i, std::uint32_t stream) {
     std::uint64_t h = (std::uint64_t(x) << 32 | y) * 0x9E3779B97F4A7C15ull;
     h ^= (std::uint64_t(i) << 32 | stream) * 0xC2B2AE3D27D4EB4Full + (h >> 29);
     h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
     h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
-    return static_cast<float>((h ^ (h >> 32)) >> 40 & 0xFFFFFF) * 0x1p-24f;
+    h ^= h >> 32;
+    const auto part = [&](int shift) { return static_cast<float>(h >> shift & 0x1FFFFF) * 0x1p-21f; };
+    return {part(0), part(21), part(42)};
 }
 
 /// Two unit vectors that make a right-handed frame with the unit vector n.
@@ -268,57 +287,86 @@ Vec3f base_colour(const Scene& scene, const RayCaster::Hit& hit, const Triangle&
     return linear(scene.scale->colour(value)) * (inside ? 0.35f : 1.0f);
 }
 
-/// Ambient occlusion by cosine-weighted rays. Neighbouring samples take interleaved parts of one pattern, so
-/// that averaging over 4×4 of them sees sixteen times as many evenly spread directions.
-float open_share(const Scene& scene, const Camera& camera, const Vec3f& origin, const Vec3f& normal,
-                 const Vec3f& face_normal, std::uint32_t x, std::uint32_t y) {
-    static constexpr std::uint32_t order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
-    const int n = scene.options.occlusion_rays;
-    if (n == 0) return 1;
-    const auto [tangent, bitangent] = tangents(normal);
-    const float turn = static_cast<float>(order[(y & 3) * 4 + (x & 3)]) / 16;
-    const float shift = static_cast<float>(order[((x + 1) & 3) * 4 + ((y + 2) & 3)]) / 16;
-    constexpr int packet = RayCaster::packet;
-    Vec3f directions[packet];
-    float lengths[packet];
-    int blocked = 0;
-    for (int i = 0; i < n; ++i) {
-        const std::uint32_t ray = static_cast<std::uint32_t>(i);
-        const float u = (static_cast<float>(i) + shift + noise(x, y, ray, 0) / 16) / static_cast<float>(n);
-        const float angle =
-            6.2831853f * (static_cast<float>(i) * 0.61803399f + turn + noise(x, y, ray, 1) / 16);
-        const float flat = std::sqrt(u);
-        Vec3f d = flat * std::cos(angle) * tangent + flat * std::sin(angle) * bitangent +
-                  std::sqrt(std::max(0.0f, 1 - u)) * normal;
-        const float below = d.dot(face_normal);
-        if (below < 0) d -= 2 * below * face_normal;  // a smooth normal may lean over its flat face
-        directions[i % packet] = camera.axes * d;
-        lengths[i % packet] = occlusion_reach * (0.05f + 0.95f * noise(x, y, ray, 2));
-        if (i % packet == packet - 1 || i == n - 1)
-            blocked += scene.rays.blocked(origin, directions, lengths, i % packet + 1);
+/// Rays from one point, cast when a packet is full. Each adds 1 to a counter where nothing blocks it.
+class Fan {
+ public:
+    Fan(const RayCaster& rays, const Vec3f& origin) : rays_(rays), origin_(origin) {}
+    void add(const Vec3f& direction, float length, int& free) {
+        directions_[count_] = direction;
+        lengths_[count_] = length;
+        counters_[count_] = &free;
+        if (++count_ == RayCaster::packet) cast();
     }
-    return 1 - static_cast<float>(blocked) / static_cast<float>(n);
+    void cast() {
+        if (count_ == 0) return;
+        const auto blocked = rays_.blocked(origin_, directions_, lengths_, count_);
+        for (int i = 0; i < count_; ++i) *counters_[i] += !blocked[static_cast<std::size_t>(i)];
+        count_ = 0;
+    }
+
+ private:
+    const RayCaster& rays_;
+    Vec3f origin_;
+    Vec3f directions_[RayCaster::packet];
+    float lengths_[RayCaster::packet];
+    int* counters_[RayCaster::packet];
+    int count_ = 0;
+};
+
+/// Neighbouring samples take interleaved parts of one pattern of directions, so that averaging over 4×4 of
+/// them sees sixteen times as many evenly spread ones. Coordinates of ray i of n in the unit disc, evenly by
+/// area, and a free number.
+struct DiscRay {
+    float square, angle, extra;  // radius², radians, [0, 1)
+};
+DiscRay disc_ray(std::uint32_t x, std::uint32_t y, int i, int n, std::uint32_t stream) {
+    static constexpr std::uint32_t order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
+    const float turn = static_cast<float>(order[(y & 3) * 4 + (x & 3)]);
+    const float shift = static_cast<float>(order[((x + 1) & 3) * 4 + ((y + 2) & 3)]);
+    const auto [a, b, c] = noise(x, y, static_cast<std::uint32_t>(i), stream);
+    const float k = static_cast<float>(i);
+    return {(k + (shift + a) / 16) / static_cast<float>(n), 6.2831853f * (k * 0.61803399f + (turn + b) / 16),
+            c};
 }
 
-float key_share(const Scene& scene, const Camera& camera, const Vec3f& origin, const Vec3f& face_normal,
-                std::uint32_t x, std::uint32_t y) {
-    if (!scene.options.shadows) return 1;
-    constexpr int n = 4;
-    const auto [tangent, bitangent] = tangents(key_light);
-    Vec3f directions[n];
-    float lengths[n];
-    int above = 0;
-    for (std::uint32_t i = 0; i < n; ++i) {
-        const float radius = 0.2f * std::sqrt((static_cast<float>(i) + noise(x, y, i, 3)) / n);
-        const float angle = 6.2831853f * (static_cast<float>(i) * 0.61803399f + noise(x, y, 0, 4));
-        const Vec3f d =
-            (key_light + radius * (std::cos(angle) * tangent + std::sin(angle) * bitangent)).normalized();
-        if (d.dot(face_normal) <= 0) continue;
-        directions[above] = camera.axes * d;
-        lengths[above++] = 4.0f;
+/// Casts the rays of ambient occlusion (cosine-weighted) and of the key light's shadow from `origin`, in the
+/// hemisphere of the smooth normal: that of the flat face would cut the light off along the faces' edges.
+void light_sample(const Scene& scene, const Camera& camera, const Vec3f& origin, std::uint32_t x,
+                  std::uint32_t y, Sample& sample) {
+    Fan fan(scene.rays, origin);
+    int open = 0, lit = 0;
+    const auto [tangent, bitangent] = tangents(sample.normal);
+    const int n = scene.options.occlusion_rays;
+    for (int i = 0; i < n; ++i) {
+        const DiscRay ray = disc_ray(x, y, i, n, 0);
+        const float flat = std::sqrt(ray.square);
+        const Vec3f d = flat * std::cos(ray.angle) * tangent + flat * std::sin(ray.angle) * bitangent +
+                        std::sqrt(std::max(0.0f, 1 - ray.square)) * sample.normal;
+        fan.add(camera.axes * d, occlusion_reach * (0.05f + 0.95f * ray.extra), open);
     }
-    if (above == 0) return 0;
-    return static_cast<float>(above - scene.rays.blocked(origin, directions, lengths, above)) / n;
+    const auto [across, up] = tangents(key_light);
+    for (int i = 0; scene.options.shadows && i < shadow_rays; ++i) {
+        const DiscRay ray = disc_ray(x, y, i, shadow_rays, 1);
+        const float flat = light_radius * std::sqrt(ray.square);
+        const Vec3f d =
+            (key_light + flat * (std::cos(ray.angle) * across + std::sin(ray.angle) * up)).normalized();
+        if (d.dot(sample.normal) > 0) fan.add(camera.axes * d, 4.0f, lit);
+    }
+    fan.cast();
+    if (n > 0) sample.open = static_cast<float>(open) / static_cast<float>(n);
+    if (scene.options.shadows) sample.lit = static_cast<float>(lit) / shadow_rays;
+}
+
+/// The point of a face moved out to where the smooth normals imagine the surface (Hanika 2021): rays that
+/// start there are not cut off by the face itself or its neighbours where the mesh is a coarse image of a
+/// convex surface. Where the surface is concave or flat the point stays.
+Vec3f lifted(const Model& model, const Triangle& t, const float* weights, const Vec3f& point, bool inside) {
+    Vec3f result = point;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3f normal = inside ? Vec3f(-model.normals[t[k]]) : model.normals[t[k]];
+        result -= weights[k] * std::min(0.0f, (point - model.points[t[k]]).dot(normal)) * normal;
+    }
+    return result;
 }
 
 Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
@@ -343,12 +391,13 @@ Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
     normal.z() = std::max(normal.z(), 0.0f);
     sample.normal = normal.norm() > 1e-6f ? Vec3f(normal.normalized()) : face_normal;
     sample.base = base_colour(scene, *hit, t, sample.inside);
+    const float weights[3] = {w, hit->u, hit->v};
     const Vec3f point = w * p[t[0]] + hit->u * p[t[1]] + hit->v * p[t[2]];
     sample.depth = point.dot(towards);
-    const Vec3f origin = point + camera.axes * (ray_offset * face_normal);
-    const auto ux = static_cast<std::uint32_t>(column), uy = static_cast<std::uint32_t>(row);
-    sample.open = open_share(scene, camera, origin, sample.normal, face_normal, ux, uy);
-    sample.lit = key_share(scene, camera, origin, face_normal, ux, uy);
+    const Vec3f origin =
+        lifted(scene.model, t, weights, point, sample.inside) + camera.axes * (ray_offset * face_normal);
+    light_sample(scene, camera, origin, static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row),
+                 sample);
     return sample;
 }
 
@@ -362,12 +411,23 @@ struct Tile {
     }
 };
 
+/// Weights of the neighbours within `reach`, row by row.
+std::vector<float> bell(int reach) {
+    std::vector<float> weights;
+    for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx)
+            weights.push_back(
+                std::exp(-1.2f * static_cast<float>(dx * dx + dy * dy) / static_cast<float>(reach * reach)));
+    return weights;
+}
+
 /// Occlusion and light averaged over the neighbours that lie on the same piece of surface.
-std::pair<float, float> smooth_light(const Tile& tile, int x, int y, int reach, float step) {
+std::pair<float, float> smooth_light(const Tile& tile, int x, int y, int reach, const float* bell,
+                                     float step) {
     const Sample& here = tile.at(x, y);
     float weight = 0, open = 0, lit = 0;
     for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx) {
+        for (int dx = -reach; dx <= reach; ++dx, ++bell) {
             const Sample& other = tile.at(x + dx, y + dy);
             if (!other.hit || other.inside != here.inside) continue;
             const float like = here.normal.dot(other.normal);
@@ -375,9 +435,7 @@ std::pair<float, float> smooth_light(const Tile& tile, int x, int y, int reach, 
             const Vec3f apart(static_cast<float>(dx) * step, static_cast<float>(-dy) * step,
                               other.depth - here.depth);
             if (std::abs(apart.dot(here.normal)) > 2 * step * static_cast<float>(reach)) continue;
-            const float w =
-                like * like *
-                std::exp(-1.2f * static_cast<float>(dx * dx + dy * dy) / static_cast<float>(reach * reach));
+            const float w = like * like * *bell;
             weight += w;
             open += w * other.open;
             lit += w * other.lit;
@@ -402,7 +460,8 @@ Vec3f shade(const Scene& scene, const Camera& camera, const Sample& s, float ope
     const float fill = std::max(0.0f, n.dot(fill_light));
     const float sky = (0.8f + 0.2f * n.y()) * std::pow(open, 1.3f);
     const Vec3f half = (key_light + Vec3f::UnitZ()).normalized();
-    const float gloss = 0.10f * std::pow(std::max(0.0f, n.dot(half)), 28.0f) * lit;
+    const float mirror = n.dot(half);
+    const float gloss = mirror > 0.7f ? 0.10f * std::pow(mirror, 28.0f) * lit : 0;  // else < 1e-5
     const Vec3f light =
         s.base * (0.95f * key + (0.16f * fill + 0.36f * sky) * (0.3f + 0.7f * open)) + Vec3f::Constant(gloss);
     const float depth = camera.near > camera.far ? (camera.near - s.depth) / (camera.near - camera.far) : 0;
@@ -414,6 +473,7 @@ Vec3f shade(const Scene& scene, const Camera& camera, const Sample& s, float ope
 void draw_tile(Image& image, const Scene& scene, const Camera& camera, const Panel& panel, int x0, int y0,
                int x1, int y1) {
     const int grid = scene.grid, reach = grid + 1;
+    const std::vector<float> weights = bell(reach);
     Tile tile{(x1 - x0) * grid + 2 * reach, (y1 - y0) * grid + 2 * reach, {}};
     tile.samples.reserve(static_cast<std::size_t>(tile.columns) * static_cast<std::size_t>(tile.rows));
     for (int y = 0; y < tile.rows; ++y)
@@ -427,7 +487,7 @@ void draw_tile(Image& image, const Scene& scene, const Camera& camera, const Pan
                 const int sx = (x - x0) * grid + k % grid + reach, sy = (y - y0) * grid + k / grid + reach;
                 const Sample& sample = tile.at(sx, sy);
                 if (!sample.hit) continue;
-                const auto [open, lit] = smooth_light(tile, sx, sy, reach, camera.step);
+                const auto [open, lit] = smooth_light(tile, sx, sy, reach, weights.data(), camera.step);
                 Vec3f colour = shade(scene, camera, sample, open, lit);
                 if (scene.options.outline && on_outline(tile, sx, sy, std::max(1, grid / 2))) colour *= 0.3f;
                 sum += colour.cwiseMin(1.0f);
@@ -453,7 +513,7 @@ void draw_panel(Image& image, const Scene& scene, const Layout& layout, const Pa
     camera.step = static_cast<float>(pixel / unit / scene.grid);
     camera.near = static_cast<float>(box.high.z() / unit);
     camera.far = static_cast<float>(box.low.z() / unit);
-    constexpr int side = 48;
+    constexpr int side = 64;
     const int across = (panel.width + side - 1) / side, down = (panel.height + side - 1) / side;
     const auto tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
     std::atomic<std::size_t> done = 0;

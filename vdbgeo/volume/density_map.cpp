@@ -1,12 +1,10 @@
 #include "vdbgeo/volume/density_map.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/ValueTransformer.h>
 
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/core/parallel.h"
 
 namespace vdbgeo {
 namespace {
@@ -20,28 +18,26 @@ void set(openvdb::MetaMap& metadata, const std::string& name, const T& value) {
     metadata.insertMeta(name, openvdb::TypedMetadata<T>(value));
 }
 
+/// Welford's update for n equal samples: no sum of squares in which a large mean would drown the deviations.
+void add(Statistics& s, double& squares, double v, std::uint64_t n) {
+    s.count += n;
+    if (!std::isfinite(v)) {
+        s.non_finite += n;
+        return;
+    }
+    s.min = std::min(s.min, v);
+    s.max = std::max(s.max, v);
+    const double step = v - s.mean, many = static_cast<double>(n);
+    s.mean += step * many / static_cast<double>(s.count - s.non_finite);
+    squares += step * (v - s.mean) * many;
+}
+
 Statistics statistics_of_active(const openvdb::FloatGrid& grid) {
     Statistics s;
-    double sum = 0, squares = 0;
-    for (auto it = grid.cbeginValueOn(); it; ++it) {
-        const double v = *it;
-        const auto n = it.getVoxelCount();
-        if (!std::isfinite(v)) {
-            s.non_finite += n;
-            continue;
-        }
-        s.count += n;
-        s.min = std::min(s.min, v);
-        s.max = std::max(s.max, v);
-        sum += v * static_cast<double>(n);
-        squares += v * v * static_cast<double>(n);
-    }
-    if (s.count > 0) {
-        const double n = static_cast<double>(s.count);
-        s.mean = sum / n;
-        s.rms = std::sqrt(std::max(0.0, squares / n - s.mean * s.mean));
-    }
-    s.count += s.non_finite;
+    double squares = 0;
+    for (auto it = grid.cbeginValueOn(); it; ++it) add(s, squares, *it, it.getVoxelCount());
+    const std::uint64_t finite = s.count - s.non_finite;
+    if (finite > 0) s.rms = std::sqrt(squares / static_cast<double>(finite));
     return s;
 }
 
@@ -53,7 +49,8 @@ Frame frame_of_transform(const openvdb::math::Transform& transform) {
     for (int a = 0; a < 3; ++a) {
         openvdb::Vec3d unit(0, 0, 0);
         unit[a] = 1;
-        const auto step = transform.indexToWorld(unit) - origin;
+        // Not as a difference of world positions: far from the world's origin that would round.
+        const auto step = transform.baseMap()->applyJacobian(unit);
         frame.axes.col(a) = Vec3d(step.x(), step.y(), step.z());
     }
     if (!(frame.voxel_volume() > 0) || !std::isfinite(frame.voxel_volume()) || !frame.origin.allFinite())
@@ -64,25 +61,37 @@ Frame frame_of_transform(const openvdb::math::Transform& transform) {
 openvdb::math::Transform::Ptr transform_of(const Frame& frame) {
     namespace vm = openvdb::math;
     const Mat3d& axes = frame.axes;
-    if (axes.isDiagonal(0)) {  // the plainest map: exact, and open to very small voxels
-        const openvdb::Vec3d scale(axes(0, 0), axes(1, 1), axes(2, 2));
-        const openvdb::Vec3d shift(frame.origin.x(), frame.origin.y(), frame.origin.z());
-        if (scale[0] == scale[1] && scale[1] == scale[2])
-            return std::make_shared<vm::Transform>(
-                vm::MapBase::Ptr(new vm::UniformScaleTranslateMap(scale[0], shift)));
-        return std::make_shared<vm::Transform>(vm::MapBase::Ptr(new vm::ScaleTranslateMap(scale, shift)));
+    const openvdb::Vec3d origin(frame.origin.x(), frame.origin.y(), frame.origin.z());
+    if (!axes.isDiagonal(0)) {
+        vm::Mat4d m = vm::Mat4d::identity();  // row vectors: row a is the step along axis a
+        for (int a = 0; a < 3; ++a)
+            for (int c = 0; c < 3; ++c) m(a, c) = axes(c, a);
+        m.setTranslation(origin);
+        return vm::Transform::createLinearTransform(m);
     }
-    vm::Mat4d m = vm::Mat4d::identity();  // row vectors: row a is the step along axis a
-    for (int a = 0; a < 3; ++a)
-        for (int c = 0; c < 3; ++c) m(a, c) = axes(c, a);
-    for (int c = 0; c < 3; ++c) m(3, c) = frame.origin[c];
-    return vm::Transform::createLinearTransform(m);
+    const openvdb::Vec3d scale(axes(0, 0), axes(1, 1), axes(2, 2));
+    const bool uniform = scale[0] == scale[1] && scale[1] == scale[2];
+    const auto transform =
+        std::make_shared<vm::Transform>(uniform ? vm::MapBase::Ptr(new vm::UniformScaleMap(scale[0]))
+                                                : vm::MapBase::Ptr(new vm::ScaleMap(scale)));
+    // Afterwards: Transform's constructor would take the scale from differences of moved points, and round
+    // it.
+    if (origin != openvdb::Vec3d(0, 0, 0)) transform->postTranslate(origin);
+    return transform;
 }
 
 }  // namespace
 
 void store_frame(DensityMap& map) {
-    map.grid->setTransform(transform_of(map.frame));
+    if (!map.frame.axes.allFinite() || !map.frame.origin.allFinite())
+        throw InvalidInput("the map's frame is not finite");
+    try {
+        map.grid->setTransform(transform_of(map.frame));
+    } catch (const openvdb::ArithmeticError&) {
+        throw InvalidInput(
+            fmt::format("a voxel of {} A3 is too small: OpenVDB takes 3e-15 and less for a flat one",
+                        map.frame.voxel_volume()));
+    }
     if (map.frame.bounded())
         set(*map.grid, size_key, openvdb::Vec3i(map.frame.size.x(), map.frame.size.y(), map.frame.size.z()));
     else
@@ -110,7 +119,8 @@ DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid) {
     const auto non_finite = grid->getMetadata<openvdb::Int64Metadata>("vdbgeo_non_finite");
     const auto min = number("vdbgeo_min"), max = number("vdbgeo_max"), mean = number("vdbgeo_mean"),
                rms = number("vdbgeo_rms");
-    if (samples && non_finite && min && max && mean && rms) {
+    const bool noted = samples && non_finite && min && max && mean && rms;
+    if (noted && non_finite->value() >= 0 && samples->value() >= non_finite->value()) {
         map.statistics = {static_cast<std::uint64_t>(samples->value()),
                           static_cast<std::uint64_t>(non_finite->value()),
                           min->value(),

@@ -48,7 +48,8 @@ struct DensityMap {
 };
 
 /// Writes the frame and the statistics into the grid's transform and metadata, so that they survive a VDB
-/// file.
+/// file, to the last bit. Throws InvalidInput for a frame that is not finite, and for voxels of 3e-15 Å³ or
+/// less, flat ones among them.
 void store_frame(DensityMap& map);
 
 /// The inverse of store_frame for a grid from any source: a frame from the transform (InvalidInput where it

@@ -136,6 +136,14 @@ void SparsifyOptions::check() const {
         throw InvalidInput("the background is not a finite number");
     if (band && !threshold) throw InvalidInput("a band needs an isovalue (the threshold) to lie about");
     if (band && !(*band > 0 && std::isfinite(*band))) throw InvalidInput("the band's width is not positive");
+    if (band && (*threshold + *band == *threshold || *threshold - *band == *threshold))
+        throw InvalidInput(
+            fmt::format("the band's width {} is lost in rounding beside the isovalue {}", *band, *threshold));
+    if (threshold && background && *background > *threshold)
+        throw InvalidInput(
+            fmt::format("the background {} lies above the threshold {}: what is dropped would "
+                        "read as if it were kept",
+                        *background, *threshold));
 }
 
 struct GridBuilder::State {
@@ -187,7 +195,8 @@ GridBuilder::GridBuilder(const Vec3i& size, const std::array<int, 3>& order, con
     s.stride[static_cast<std::size_t>(order[2])] =
         static_cast<std::size_t>(size[order[0]]) * static_cast<std::size_t>(size[order[1]]);
     const double nx = size.x(), ny = size.y(), nz = size.z();
-    s.border_step = static_cast<std::uint64_t>(2 * (nx * ny + ny * nz + nz * nx) / (1 << 20)) + 1;
+    // Odd: inner rows give one sample of either face in turn, and an even step would miss one face.
+    s.border_step = static_cast<std::uint64_t>(2 * (nx * ny + ny * nz + nz * nx) / (1 << 20)) | 1;
 }
 
 GridBuilder::~GridBuilder() = default;
@@ -208,7 +217,7 @@ void GridBuilder::State::sample_border(const float* data, int count) {
                 for (int c = 0; c < columns; ++c) take(row[c]);
             } else {
                 take(row[0]);
-                take(row[columns - 1]);
+                if (columns > 1) take(row[columns - 1]);
             }
         }
     }
@@ -245,7 +254,7 @@ void GridBuilder::State::decide(const Block& block, Result& result) const {
     const float low = keep_all ? 0 : lower();
     const float high = options.band ? upper() : std::numeric_limits<float>::infinity();
     const Moments& m = result.moments;
-    if (!keep_all && (m.count == 0 || m.max <= low) && (m.non_finite == 0)) return;
+    if (!keep_all && (m.count == 0 || m.max <= low)) return;
     if (!keep_all && block.whole() && m.non_finite == 0 && m.min > high) {
         result.tile = Result::Tile::above;
         result.tile_value = high;
@@ -266,8 +275,9 @@ void GridBuilder::State::decide(const Block& block, Result& result) const {
     } else {
         for_each_inside(block.extent, [&](int i) {
             const float v = block.values[i];
-            out[i] = v > high ? high : v;
-            if (keep_all || (v > low && v <= high)) mask.setOn(static_cast<openvdb::Index32>(i));
+            out[i] = v > high && std::isfinite(v) ? high : v;
+            if (keep_all || (v > low && v <= high && std::isfinite(v)))
+                mask.setOn(static_cast<openvdb::Index32>(i));
         });
         // What lies above a band stays there, as an inactive value; what lies below becomes background.
         if (mask.isOff() && !(m.max > high)) return;
@@ -297,7 +307,7 @@ void GridBuilder::add_sections(const float* data, int count) {
     if (count < 1 || s.done % slab != 0 || count > sections - s.done)
         throw InvalidInput(fmt::format("{} sections handed over after {} of {}", count, s.done, sections));
     s.sample_border(data, count);
-    const int across = (s.size[s.order[0]] + 7) / 8, down = (s.size[s.order[1]] + 7) / 8;
+    const int across = (s.size[s.order[0]] - 1) / 8 + 1, down = (s.size[s.order[1]] - 1) / 8 + 1;
     const std::size_t blocks = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
     for (int first = 0; first < count; first += slab) {
         const int height = std::min(slab, count - first);
@@ -337,6 +347,7 @@ float GridBuilder::State::solvent_level() {
 
 DensityMap GridBuilder::finish(const Frame& frame) {
     State& s = *state_;
+    if (!s.grid) throw InvalidInput("the map was handed out already");
     if (s.done != s.size[s.order[2]])
         throw InvalidInput(fmt::format("{} of {} sections were handed over", s.done, s.size[s.order[2]]));
     const float background = s.solvent_level();
@@ -363,7 +374,7 @@ DensityMap GridBuilder::finish(const Frame& frame) {
         for (auto it = node->beginValueAll(); it; ++it) it.setValue(background);
 
     DensityMap map;
-    map.grid = s.grid;
+    map.grid = std::move(s.grid);
     map.grid->setName("density");
     map.grid->setGridClass(openvdb::GRID_UNKNOWN);
     map.frame = frame;

@@ -12,13 +12,14 @@ namespace vdbgeo {
 /// Which samples a sparse grid keeps. With neither field set every sample is kept, and going back to a dense
 /// file gives the same bits.
 struct SparsifyOptions {
-    /// Keep samples above this value; the rest reads as the background.
+    /// Keep samples above this value; the rest reads as the background, and so does what is not finite.
     std::optional<float> threshold;
     /// Keep samples within `band` of `threshold` (which is then the isovalue). What lies above the band is
     /// not active and reads as the band's upper end, so the surface at the isovalue is unchanged.
     std::optional<float> band;
-    /// The value of what was dropped: the solvent level. Unset: the median over the faces of the box, but not
-    /// above the threshold (or the band's lower end).
+    /// The value of what was dropped: the solvent level, not above the threshold. Unset: the median over the
+    /// faces of the box (of about a million of their samples, where there are more), but not above the
+    /// threshold (or the band's lower end).
     std::optional<float> background;
 
     /// Throws InvalidInput when the fields contradict each other.
@@ -48,7 +49,8 @@ class GridBuilder {
     /// The next `count` sections. Throws InvalidInput when more come than `size` allows.
     void add_sections(const float* data, int count);
 
-    /// The map, with statistics over all samples handed over. Throws InvalidInput when sections are missing.
+    /// The map, with statistics over all samples handed over; once. Throws InvalidInput when sections are
+    /// missing.
     DensityMap finish(const Frame& frame);
 
  private:

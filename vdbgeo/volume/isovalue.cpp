@@ -28,10 +28,11 @@ std::string Isovalue::text() const {
     return fmt::format("{}{}", number, rule == Rule::sigma ? "sigma" : "");
 }
 
-double Isovalue::resolve(const Statistics& s, bool level_set) const {
+double Isovalue::resolve(const Statistics& s, openvdb::GridClass grid_class) const {
     if (rule == Rule::value) return number;
-    if (rule == Rule::automatic && level_set) return 0;
+    if (rule == Rule::automatic && grid_class == openvdb::GRID_LEVEL_SET) return 0;
     if (s.count == s.non_finite) throw InvalidInput("the map has no finite sample to take an isovalue from");
+    if (rule == Rule::automatic && grid_class == openvdb::GRID_FOG_VOLUME) return 0.5 * s.max;
     return s.mean + (rule == Rule::sigma ? number : 3) * s.rms;
 }
 

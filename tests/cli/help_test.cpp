@@ -1,0 +1,106 @@
+// Help, versions and the examples they show.
+#include <sstream>
+
+#include "tests/cli/cli_test.h"
+
+using namespace vdbgeo::test;
+
+namespace {
+
+const Words all_commands{"info", "convert", "phantom", "surface", "measure", "render", "model"};
+
+struct Promise {
+    const char* command;
+    Words texts;  // units and defaults
+};
+
+const std::vector<Promise> promises{
+    {"info", {"Voxel size in Å", "--origin TEXT=auto", "x,y,z in Å", "--volume INT=0", "[all]"}},
+    {"convert", {"Voxel size in Å", "in the map's units", "sigma", "0, 1, 2, 6, 12 or 101", "[blosc]"}},
+    {"phantom",
+     {"--size INT=128", "Voxel size in Å", "Radius in Å", "Height in Å", "Period in Å", "[no noise]"}},
+    {"surface", {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å"}},
+    {"measure", {".ply .obj .off .stl", "PNG"}},
+    {"render",
+     {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=4", "--occlusion INT=8"}},
+    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
+
+/// The words of the lines below "Example:" that call a program.
+std::vector<Words> examples_in(const std::string& help) {
+    std::vector<Words> found;
+    std::istringstream lines(help.substr(std::min(help.find("Example:"), help.size())));
+    for (std::string line; std::getline(lines, line);) {
+        if (line.rfind("  vdbgeo ", 0) != 0) continue;
+        std::istringstream words(line);
+        found.emplace_back();
+        for (std::string word; words >> word;) found.back().push_back(word);
+    }
+    return found;
+}
+
+class Help : public Cli {};
+
+}  // namespace
+
+TEST_F(Help, ProgramsTellTheirVersions) {
+    for (const char* program : {VDBGEO_PROGRAM, MRC2VDB_PROGRAM, VDB2MRC_PROGRAM}) {
+        const Ended r = run({program, "--version"});
+        EXPECT_EQ(r.code, 0) << program;
+        EXPECT_EQ(r.out.rfind("vdbgeo ", 0), 0u) << r.out;
+        EXPECT_NE(r.out.find("openvdb"), std::string::npos) << r.out;
+        EXPECT_EQ(r.err, "");
+    }
+}
+
+TEST_F(Help, ListsEveryCommandAndTheExitCodes) {
+    const Ended r = vdbgeo({"--help"});
+    EXPECT_EQ(r.code, 0);
+    EXPECT_EQ(r.err, "");
+    for (const std::string& command : all_commands)
+        EXPECT_NE(r.out.find("\n  " + command + " "), std::string::npos) << command;
+    for (const char* code :
+         {"0 done", "2 usage", "3 bad input", "4 reading or writing", "5 the computation", "130 int"})
+        EXPECT_NE(r.out.find(code), std::string::npos) << code;
+}
+
+TEST_F(Help, OfEachCommandHasAnExampleUnitsAndDefaults) {
+    ASSERT_EQ(promises.size(), all_commands.size());
+    for (const Promise& promise : promises) {
+        const Ended r = vdbgeo({promise.command, "--help"});
+        EXPECT_EQ(r.code, 0);
+        EXPECT_EQ(r.err, "");
+        EXPECT_FALSE(examples_in(r.out).empty()) << r.out;
+        for (const std::string& text : promise.texts)
+            EXPECT_NE(r.out.find(text), std::string::npos) << promise.command << ": " << text;
+        for (const char* common : {"--json", "--quiet", "--threads"})
+            EXPECT_NE(r.out.find(common), std::string::npos) << promise.command << ": " << common;
+    }
+    for (const char* program : {MRC2VDB_PROGRAM, VDB2MRC_PROGRAM}) {
+        const Ended r = run({program, "--help"});
+        EXPECT_EQ(r.code, 0);
+        EXPECT_NE(r.out.find("Voxel size in Å"), std::string::npos);
+    }
+}
+
+// The examples as they stand, in a folder that has their files: maps and meshes made for the purpose.
+TEST_F(Help, ExamplesRun) {
+    phantom("emd_1080.map", 24);
+    good({"surface", at("emd_1080.map"), at("groel.ply"), "--iso", "0.8"});
+    RunOptions here;
+    here.folder = folder_.path();
+    for (const std::string& command : all_commands) {
+        for (Words words : examples_in(good({command, "--help"}).out)) {
+            words[0] = VDBGEO_PROGRAM;
+            EXPECT_EQ(words[1], command);
+            // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
+            for (std::size_t i = 2; i + 1 < words.size(); ++i)
+                if (words[i] == "--size") words[i + 1] = "24";
+            if (command == "render" || command == "model")
+                for (const char* word : {"--width", "160", "--occlusion", "0"}) words.push_back(word);
+            const Ended r = run(words, here);
+            EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
+        }
+    }
+    for (const char* made : {"emd_1080.vdb", "atpase.mrc", "clean.mrc", "groel.png", "groel/surface.ply"})
+        EXPECT_TRUE(listing().count(made)) << made;
+}

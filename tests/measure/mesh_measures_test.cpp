@@ -1,0 +1,307 @@
+// Topology, areas, volumes and angles of meshes of which they are known.
+#include "vdbgeo/measure/mesh_measures.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "tests/support/meshes.h"
+#include "vdbgeo/core/errors.h"
+
+using namespace vdbgeo;
+using namespace vdbgeo::test;
+
+namespace {
+
+TriMesh mesh_of(const std::vector<Vec3f>& points, const std::vector<Triangle>& triangles) {
+    TriMesh mesh;
+    mesh.points.assign(points.begin(), points.end());
+    mesh.triangles.assign(triangles.begin(), triangles.end());
+    return mesh;
+}
+
+TriMesh tetrahedron() {
+    return mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                   {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}});
+}
+
+/// Corner number: bit 0 x, bit 1 y, bit 2 z.
+TriMesh cube(const Vec3f& corner = {0, 0, 0}, float edge = 1) {
+    std::vector<Vec3f> points;
+    for (int i = 0; i < 8; ++i)
+        points.push_back(corner + edge * Vec3f(float(i & 1), float(i >> 1 & 1), float(i >> 2 & 1)));
+    return mesh_of(points, {{0, 2, 3},
+                            {0, 3, 1},
+                            {4, 5, 7},
+                            {4, 7, 6},
+                            {0, 1, 5},
+                            {0, 5, 4},
+                            {2, 6, 7},
+                            {2, 7, 3},
+                            {0, 4, 6},
+                            {0, 6, 2},
+                            {1, 3, 7},
+                            {1, 7, 5}});
+}
+
+/// Two meshes with vertices of the second put in place of those of the first.
+TriMesh glued(const TriMesh& a, const TriMesh& b, const std::vector<std::pair<VertexId, VertexId>>& pairs) {
+    TriMesh mesh = joined(a, b);
+    for (Triangle& t : mesh.triangles)
+        for (VertexId& v : t)
+            for (const auto& [in_a, in_b] : pairs)
+                if (v == a.points.size() + in_b) v = in_a;
+    return mesh;
+}
+
+TriMesh moebius(int around) {
+    TriMesh mesh;
+    for (int i = 0; i < around; ++i)
+        for (const double side : {-0.3, 0.3}) {
+            const double u = 2 * M_PI * i / around, far = 1 + side * std::cos(u / 2);
+            mesh.points.emplace_back(float(far * std::cos(u)), float(far * std::sin(u)),
+                                     float(side * std::sin(u / 2)));
+        }
+    for (int i = 0; i < around; ++i) {
+        const VertexId a = VertexId(2 * i), b = a + 1;
+        VertexId c = VertexId((2 * i + 2) % (2 * around)), d = c + 1;
+        if (i + 1 == around) std::swap(c, d);
+        mesh.triangles.push_back({a, b, d});
+        mesh.triangles.push_back({a, d, c});
+    }
+    return mesh;
+}
+
+MeshMeasures triangle(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+    return measure_mesh(mesh_of({a, b, c}, {{0, 1, 2}}));
+}
+
+}  // namespace
+
+TEST(MeshMeasures, ATetrahedron) {
+    const MeshMeasures m = measure_mesh(tetrahedron());
+    EXPECT_EQ(m.vertices, 4u);
+    EXPECT_EQ(m.faces, 4u);
+    EXPECT_EQ(m.edges, 6u);
+    EXPECT_EQ(m.euler_characteristic, 2);
+    EXPECT_EQ(m.genus, 0);
+    EXPECT_EQ(m.components, 1u);
+    EXPECT_TRUE(m.closed && m.oriented && m.manifold);
+    EXPECT_NEAR(m.area_A2, 1.5 + std::sqrt(3) / 2, 1e-15);
+    EXPECT_NEAR(m.volume_A3.value(), 1.0 / 6, 1e-16);
+    EXPECT_NEAR(m.min_angle_deg, 45, 1e-12);
+    EXPECT_NEAR(m.max_angle_deg, 90, 1e-12);
+    EXPECT_NEAR(m.mean_angle_deg, 60, 1e-12);
+}
+
+TEST(MeshMeasures, ACubeFarFromTheOriginHasItsExactVolume) {
+    for (const Vec3f& corner : {Vec3f(0, 0, 0), Vec3f(1e5f, -1e5f, 1e5f)})
+        for (const float edge : {1.0f, 0.25f}) {
+            const MeshMeasures m = measure_mesh(cube(corner, edge));
+            EXPECT_EQ(m.edges, 18u);
+            EXPECT_EQ(m.genus, 0);
+            EXPECT_EQ(m.area_A2, 6 * edge * edge);
+            EXPECT_NEAR(m.volume_A3.value(), edge * edge * edge, 1e-14);
+        }
+}
+
+TEST(MeshMeasures, InwardNormalsMakeANegativeVolume) {
+    EXPECT_NEAR(measure_mesh(flipped(cube())).volume_A3.value(), -1, 1e-15);
+    // A hollow in a solid counts against it.
+    const MeshMeasures m = measure_mesh(joined(cube({0, 0, 0}, 4), flipped(cube({1, 1, 1}, 1))));
+    EXPECT_NEAR(m.volume_A3.value(), 63, 1e-12);
+    EXPECT_EQ(m.components, 2u);
+    EXPECT_EQ(m.genus, 0);
+}
+
+TEST(MeshMeasures, AnUnusedPointFarAwayDisturbsNothing) {
+    TriMesh mesh = cube();
+    mesh.points.push_back(Vec3f(1e30f, 0, 0));
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_EQ(m.vertices, 9u);
+    EXPECT_EQ(m.unused_vertices, 1u);
+    EXPECT_EQ(m.components, 1u);
+    EXPECT_EQ(m.euler_characteristic, 2);
+    EXPECT_NEAR(m.volume_A3.value(), 1, 1e-15);
+}
+
+TEST(MeshMeasures, HandlesAreCounted) {
+    const MeshMeasures one = measure_mesh(torus_mesh(3, 1));
+    EXPECT_EQ(one.genus, 1);
+    EXPECT_EQ(one.euler_characteristic, 0);
+    EXPECT_GT(one.volume_A3.value(), 0);
+    EXPECT_NEAR(one.area_A2, 4 * M_PI * M_PI * 3, 0.2);
+    EXPECT_NEAR(*one.volume_A3, 2 * M_PI * M_PI * 3, 0.3);
+    const TriMesh apart = moved(torus_mesh(3, 1), Mat3d::Identity(), Vec3d(20, 0, 0));
+    const MeshMeasures three = measure_mesh(joined(joined(torus_mesh(3, 1), apart), icosphere(2, 1)));
+    EXPECT_EQ(three.components, 3u);
+    EXPECT_EQ(three.genus, 2);
+    EXPECT_EQ(three.euler_characteristic, 2);
+}
+
+TEST(MeshMeasures, TwoCubesThatTouchWithoutSharingAnythingAreTwo) {
+    const MeshMeasures m = measure_mesh(joined(cube(), cube({1, 0, 0})));
+    EXPECT_EQ(m.components, 2u);
+    EXPECT_TRUE(m.closed && m.manifold);
+    EXPECT_NEAR(m.volume_A3.value(), 2, 1e-14);
+}
+
+TEST(MeshMeasures, TwoCubesThatShareAVertex) {
+    const MeshMeasures m = measure_mesh(glued(cube(), cube({1, 1, 1}), {{7, 0}}));
+    EXPECT_EQ(m.components, 1u);
+    EXPECT_EQ(m.non_manifold_vertices, 1u);
+    EXPECT_EQ(m.non_manifold_edges, 0u);
+    EXPECT_EQ(m.unused_vertices, 1u);
+    EXPECT_EQ(m.euler_characteristic, 3);
+    EXPECT_TRUE(m.closed && m.oriented);
+    EXPECT_FALSE(m.manifold);
+    EXPECT_FALSE(m.genus);
+    EXPECT_NEAR(m.volume_A3.value(), 2, 1e-14);  // still encloses one
+}
+
+TEST(MeshMeasures, TwoCubesThatShareAnEdge) {
+    const MeshMeasures m = measure_mesh(glued(cube(), cube({1, 1, 0}), {{3, 0}, {7, 4}}));
+    EXPECT_EQ(m.components, 1u);
+    EXPECT_EQ(m.non_manifold_edges, 1u);
+    EXPECT_EQ(m.boundary_edges, 0u);
+    EXPECT_EQ(m.non_manifold_vertices, 0u);
+    EXPECT_EQ(m.edges, 35u);
+    EXPECT_FALSE(m.closed || m.manifold);
+    EXPECT_FALSE(m.volume_A3 || m.genus);
+}
+
+TEST(MeshMeasures, AMoebiusStripCannotBeOriented) {
+    const MeshMeasures m = measure_mesh(moebius(30));
+    EXPECT_TRUE(m.manifold);
+    EXPECT_FALSE(m.oriented);
+    EXPECT_EQ(m.misoriented_edges, 1u);
+    EXPECT_EQ(m.euler_characteristic, 0);
+    EXPECT_EQ(m.boundary_edges, 60u);
+    EXPECT_FALSE(m.volume_A3 || m.genus);
+}
+
+TEST(MeshMeasures, AnOpenCylinder) {
+    const MeshMeasures m = measure_mesh(open_cylinder_mesh(1, 2, 24, 96));
+    EXPECT_EQ(m.boundary_edges, 2u * 96u);
+    EXPECT_EQ(m.euler_characteristic, 0);
+    EXPECT_TRUE(m.manifold && m.oriented);
+    EXPECT_FALSE(m.closed);
+    EXPECT_FALSE(m.volume_A3 || m.genus);
+    EXPECT_NEAR(m.area_A2, 2 * 96 * std::sin(M_PI / 96) * 2, 1e-5);
+}
+
+TEST(MeshMeasures, AFaceTurnedOver) {
+    TriMesh mesh = cube();
+    std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_EQ(m.misoriented_edges, 3u);
+    EXPECT_TRUE(m.closed && m.manifold);
+    EXPECT_FALSE(m.oriented);
+    EXPECT_FALSE(m.volume_A3 || m.genus);
+    EXPECT_EQ(m.area_A2, 6);
+}
+
+TEST(MeshMeasures, FacesThatNameAVertexTwiceAreLeftOutOfTheTopology) {
+    TriMesh mesh = cube();
+    mesh.triangles.push_back({0, 2, 0});
+    mesh.triangles.push_back({1, 1, 1});
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_EQ(m.faces, 14u);
+    EXPECT_EQ(m.degenerate_faces, 2u);
+    EXPECT_EQ(m.edges, 18u);
+    EXPECT_EQ(m.euler_characteristic, 2);
+    EXPECT_TRUE(m.closed && m.oriented);
+    EXPECT_FALSE(m.manifold);
+    EXPECT_NEAR(m.volume_A3.value(), 1, 1e-15);
+    EXPECT_EQ(m.angle_histogram[179], 2u);
+    const MeshMeasures only = measure_mesh(mesh_of({{0, 0, 0}, {1, 0, 0}}, {{0, 1, 0}}));
+    EXPECT_FALSE(only.closed || only.manifold);
+    EXPECT_EQ(only.components, 0u);
+    EXPECT_EQ(only.unused_vertices, 2u);
+}
+
+TEST(MeshMeasures, ThreeFacesOnOneEdge) {
+    const MeshMeasures m = measure_mesh(mesh_of({{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}},
+                                                {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}));
+    EXPECT_EQ(m.non_manifold_edges, 1u);
+    EXPECT_EQ(m.boundary_edges, 6u);
+    EXPECT_EQ(m.edges, 7u);
+    EXPECT_EQ(m.components, 1u);
+}
+
+TEST(MeshMeasures, AnglesOfKnownTriangles) {
+    const MeshMeasures right = triangle({0, 0, 0}, {4, 0, 0}, {0, 3, 0});
+    EXPECT_NEAR(right.min_angle_deg, std::atan2(3, 4) * 180 / M_PI, 1e-13);
+    EXPECT_NEAR(right.max_angle_deg, 90, 1e-13);
+    const MeshMeasures obtuse = triangle({0, 0, 0}, {1, 0, 0}, {-1, 1, 0});
+    EXPECT_NEAR(obtuse.max_angle_deg, 135, 1e-13);
+    EXPECT_EQ(obtuse.angle_histogram[135] + obtuse.angle_histogram[134], 1u);
+}
+
+TEST(MeshMeasures, NeedlesHaveExactAngles) {
+    // 1e-6 high over a base of 1, also beside other points far away.
+    const float high = 1e-6f;
+    const double sharp = std::atan2(double(high), 0.5) * 180 / M_PI;
+    TriMesh mesh = mesh_of({{0, 0, 0}, {1, 0, 0}, {0.5f, high, 0}}, {{0, 1, 2}});
+    for (const float far : {0.0f, 12345.678f}) {
+        if (far > 0) mesh = joined(mesh, cube({far, far / 3, -far}, 1));
+        const MeshMeasures m = measure_mesh(mesh);
+        EXPECT_NEAR(m.min_angle_deg / sharp, 1, 1e-12);
+        EXPECT_NEAR((180 - m.max_angle_deg) / (2 * sharp), 1, 1e-7);  // 180 − 1e-4 has 10 digits behind it
+    }
+}
+
+TEST(MeshMeasures, AFaceWithoutAreaCountsAsFlat) {
+    const MeshMeasures m = triangle({0.1f, 0.2f, 0.3f}, {0.2f, 0.4f, 0.6f}, {0.4f, 0.8f, 1.2f});
+    EXPECT_EQ(m.min_angle_deg, 0);
+    EXPECT_EQ(m.max_angle_deg, 180);
+    EXPECT_EQ(m.mean_angle_deg, 60);
+    EXPECT_EQ(m.angle_histogram[0], 2u);
+    EXPECT_EQ(m.angle_histogram[179], 1u);
+    EXPECT_EQ(m.degenerate_faces, 0u);
+}
+
+TEST(MeshMeasures, TheHistogramHoldsEveryAngle) {
+    for (const TriMesh& mesh : {icosphere(3, 2), torus_mesh(3, 1), open_cylinder_mesh(1, 2), tetrahedron()}) {
+        const MeshMeasures m = measure_mesh(mesh);
+        EXPECT_EQ(std::accumulate(m.angle_histogram.begin(), m.angle_histogram.end(), std::uint64_t(0)),
+                  3 * m.faces);
+        EXPECT_NEAR(m.mean_angle_deg, 60, 1e-9);
+        EXPECT_GT(m.angle_histogram[std::size_t(m.min_angle_deg)], 0u);
+        EXPECT_GT(m.angle_histogram[std::size_t(m.max_angle_deg)], 0u);
+    }
+}
+
+TEST(MeshMeasures, AnEmptyMesh) {
+    for (TriMesh mesh : {TriMesh(), mesh_of({{1, 2, 3}}, {})}) {
+        const MeshMeasures m = measure_mesh(mesh);
+        EXPECT_EQ(m.vertices, mesh.points.size());
+        EXPECT_EQ(m.unused_vertices, mesh.points.size());
+        EXPECT_EQ(m.faces + m.edges + m.components, 0u);
+        EXPECT_FALSE(m.closed);
+        EXPECT_FALSE(m.volume_A3 || m.genus);
+        EXPECT_EQ(m.area_A2, 0);
+    }
+}
+
+TEST(MeshMeasures, SameBitsForAnyNumberOfThreads) {
+    const TriMesh mesh = icosphere(6, 10);
+    const MeshMeasures once = measure_mesh(mesh);
+    for (const std::size_t threads : {1, 2, 7}) {
+        tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        const MeshMeasures m = measure_mesh(mesh);
+        EXPECT_EQ(m.area_A2, once.area_A2);
+        EXPECT_EQ(m.volume_A3, once.volume_A3);
+        EXPECT_EQ(m.mean_angle_deg, once.mean_angle_deg);
+    }
+}
+
+TEST(MeshMeasures, BadMeshesAreRefused) {
+    EXPECT_THROW(measure_mesh(mesh_of({{0, 0, 0}}, {{0, 1, 2}})), InvalidInput);
+    const float nothing = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_THROW(measure_mesh(mesh_of({{0, 0, nothing}}, {})), InvalidInput);
+    EXPECT_THROW(measure_mesh(tetrahedron(), Progress([](double) { return false; })), Cancelled);
+}

@@ -31,26 +31,11 @@ std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
     return __builtin_add_overflow(a, b, &result) ? too_many : result;
 }
 
-SampleType sample_type(const MrcHeader& h, const MrcReadOptions& options) {
+SampleType stored_type(const MrcHeader& h, const MrcReadOptions& options) {
     using Mode0 = MrcReadOptions::Mode0;
-    switch (h.mode) {
-        case 0: {
-            const bool imod_unsigned = h.imod_stamp == imod_stamp_value && (h.imod_flags & 1) == 0;
-            const bool is_unsigned =
-                options.mode0 == Mode0::as_unsigned || (options.mode0 == Mode0::automatic && imod_unsigned);
-            return is_unsigned ? SampleType::uint8 : SampleType::int8;
-        }
-        case 1:
-            return SampleType::int16;
-        case 6:
-            return SampleType::uint16;
-        case 12:
-            return SampleType::float16;
-        case 101:
-            return SampleType::uint4;
-        default:
-            return SampleType::float32;
-    }
+    const bool imod_unsigned = h.imod_stamp == imod_stamp_value && (h.imod_flags & 1) == 0;
+    return sample_type(h.mode, options.mode0 == Mode0::as_unsigned ||
+                                   (options.mode0 == Mode0::automatic && imod_unsigned));
 }
 
 /// Works the layout out, step by step; each step may warn.
@@ -60,7 +45,7 @@ class Interpreter {
         : h_(header), options_(options), file_(file) {}
 
     MrcLayout run(std::optional<std::uint64_t> length, std::uint64_t bound) {
-        out_.type = sample_type(h_, options_);
+        out_.type = stored_type(h_, options_);
         out_.columns = static_cast<std::uint64_t>(h_.nx);
         out_.rows = static_cast<std::uint64_t>(h_.ny);
         out_.row_bytes = row_bytes(out_.type, out_.columns);
@@ -359,7 +344,7 @@ std::optional<Mat3d> cell_directions(const Vec3d& angles) {
 }
 
 std::uint64_t promised_bytes(const MrcHeader& h) {
-    const SampleType type = sample_type(h, {});
+    const SampleType type = stored_type(h, {});
     const std::uint64_t section =
         product(row_bytes(type, static_cast<std::uint64_t>(h.nx)), static_cast<std::uint64_t>(h.ny));
     const std::uint64_t data = product(section, static_cast<std::uint64_t>(h.nz));

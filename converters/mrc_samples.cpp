@@ -75,6 +75,23 @@ std::size_t to_nibbles(const float* in, void* out, std::size_t count) {
 
 }  // namespace
 
+SampleType sample_type(int mode, bool unsigned_bytes) {
+    switch (mode) {
+        case 0:
+            return unsigned_bytes ? SampleType::uint8 : SampleType::int8;
+        case 1:
+            return SampleType::int16;
+        case 6:
+            return SampleType::uint16;
+        case 12:
+            return SampleType::float16;
+        case 101:
+            return SampleType::uint4;
+        default:
+            return SampleType::float32;
+    }
+}
+
 const char* name_of(SampleType type) {
     switch (type) {
         case SampleType::int8:

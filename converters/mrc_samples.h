@@ -8,6 +8,9 @@ namespace vdbgeo {
 
 enum class SampleType { int8, uint8, int16, uint16, float16, float32, uint4 };
 
+/// How the samples of a mode are stored: 1, 6, 12, 101 and 2 name one type each, 0 has bytes of either sign.
+SampleType sample_type(int mode, bool unsigned_bytes);
+
 /// "int8", "uint4", …
 const char* name_of(SampleType type);
 

@@ -209,23 +209,6 @@ class Packer {
     std::vector<std::size_t> bad_;
 };
 
-SampleType type_of(int mode, bool unsigned_bytes) {
-    switch (mode) {
-        case 0:
-            return unsigned_bytes ? SampleType::uint8 : SampleType::int8;
-        case 1:
-            return SampleType::int16;
-        case 6:
-            return SampleType::uint16;
-        case 12:
-            return SampleType::float16;
-        case 101:
-            return SampleType::uint4;
-        default:
-            return SampleType::float32;
-    }
-}
-
 void write_checked(const DensityMap& map, const std::filesystem::path& path, const MrcWriteOptions& options,
                    const Progress& progress) {
     const MrcRecord record = recall_mrc_metadata(*map.grid);
@@ -233,7 +216,7 @@ void write_checked(const DensityMap& map, const std::filesystem::path& path, con
     const int mode = options.mode.value_or(record.mode.value_or(2));
     const bool unsigned_bytes = mode == 0 && !options.mode && record.unsigned_bytes;
     MrcHeader header = make_header(map, record, box, mode, unsigned_bytes);
-    const SampleType type = type_of(mode, unsigned_bytes);
+    const SampleType type = sample_type(mode, unsigned_bytes);
     const DenseSections sections(*map.grid, box.first, box.size, record.order);
     Packer packer(type, header, box, record.order);
     Array<float> values(sections.largest_piece());

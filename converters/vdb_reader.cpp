@@ -24,7 +24,7 @@ class ByteStream : public std::istream {
         : std::istream(nullptr), buffer_(bytes) {
         rdbuf(&buffer_);
         namespace io = openvdb::io;
-        io::setVersion(*this, {skeleton.library_major, skeleton.library_minor}, skeleton.version);
+        io::setVersion(*this, {skeleton.release_major, skeleton.release_minor}, skeleton.version);
         io::setDataCompression(*this, entry.compression);
     }
 

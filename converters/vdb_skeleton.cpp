@@ -128,8 +128,8 @@ VdbSkeleton walk_vdb(VdbCursor& cursor) {
     if (skeleton.version < oldest_version || skeleton.version > newest_version)
         cursor.fail(fmt::format("file format version {}, {} to {} can be read", skeleton.version,
                                 oldest_version, newest_version));
-    skeleton.library_major = cursor.number<std::uint32_t>("library version");
-    skeleton.library_minor = cursor.number<std::uint32_t>("library version");
+    skeleton.release_major = cursor.number<std::uint32_t>("library version");
+    skeleton.release_minor = cursor.number<std::uint32_t>("library version");
     const auto offsets_flag = cursor.number<std::uint8_t>("offsets flag");
     if (offsets_flag > 1)
         cursor.fail(fmt::format("the flag for grid offsets is {}, not 0 or 1", offsets_flag));

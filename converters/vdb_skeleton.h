@@ -58,7 +58,7 @@ struct VdbEntry {
 };
 
 struct VdbSkeleton {
-    std::uint32_t version = 0, library_major = 0, library_minor = 0;
+    std::uint32_t version = 0, release_major = 0, release_minor = 0;
     bool streamed = false;  ///< written to a pipe: without offsets, one grid behind the other
     std::vector<VdbEntry> grids;
 };

@@ -31,9 +31,16 @@ void convert_mesh(const ConvertOptions& o, Session& session) {
 void convert_map(const ConvertOptions& o, Session& session) {
     Json seconds;
     Clock clock;
-    const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
+    MapReadOptions options = o.map.options;
+    const std::filesystem::path folder = std::filesystem::path(o.out).parent_path();
+    options.scratch = o.out == "-" ? "" : folder.empty() ? "." : folder;
+    const auto progress = session.stage("reading");
+    const bool stream = is_vdb_ending(o.out) && !is_vdb_file(o.in);
+    const MapFile in = stream ? stream_map(o.in, options, o.vdb, progress) : read_map(o.in, options, progress);
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
+    if (!session.quiet)
+        for (const std::string& note : in.notes) session.say(o.in + ": " + note);
     if (in.map.grid->activeVoxelCount() == 0)
         throw NumericalError(
             fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
@@ -44,6 +51,7 @@ void convert_map(const ConvertOptions& o, Session& session) {
     Json j{{"in", o.in}, {"out", o.out}};
     j.update(grid_json(in.map));
     j["warnings"] = in.warnings;
+    j["notes"] = in.notes;
     j["seconds"] = seconds;
     if (!session.json && !session.quiet)
         session.say(
@@ -74,6 +82,7 @@ Command convert_command() {
                     ->required();
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);
+                o->map.add_memory(app);
                 add_vdb_flags(app, o->vdb);
                 app.add_option("--mode", o->mrc.mode,
                                "MRC mode to write: 0, 1, 2, 6, 12 or 101 [the input's, else 2]");

@@ -5,6 +5,7 @@
 #include "apps/flags.h"
 #include "apps/reports.h"
 #include "converters/mesh_file.h"
+#include "converters/strip_source.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -35,9 +36,9 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
         j.update(measures_json(measure_mesh(read_mesh(file, progress.part(0, 0.5)), progress.part(0.5, 1))));
     } else {
         j["kind"] = "map";
-        MrcReader reader(file, options.map.options.mrc);
-        const Statistics statistics = mrc_statistics(reader, options.map.options.invert, progress);
-        j.update(mrc_json(reader, statistics, reader.warnings()));
+        StripSource source(file, options.map.options, 1);
+        const Statistics statistics = strip_statistics(source, progress);
+        j.update(mrc_json(source.reader(), statistics, source.warnings()));
         if (options.validate) j["departures"] = validate_mrc(file);
     }
     session.end_stage();

@@ -8,6 +8,45 @@
 namespace vdbgeo::app {
 namespace {
 
+/// "10:90,:,20:" along x, y, z.
+Crop parse_crop(const std::string& text) {
+    Crop crop;
+    const auto fail = [&] {
+        return UsageError(fmt::format("--crop: '{}' is not x0:x1,y0:y1,z0:z1 in voxels, where numbers may be left out", text));
+    };
+    const auto number = [&](const std::string& word) -> std::optional<int> {
+        int value = 0;
+        if (word.empty()) return {};
+        const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+        if (error != std::errc() || rest != word.data() + word.size()) throw fail();
+        return value;
+    };
+    std::size_t at = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const std::size_t colon = text.find(':', at), end = a < 2 ? text.find(',', at) : text.size();
+        if (colon == std::string::npos || end == std::string::npos || colon > end) throw fail();
+        crop.begin[a] = number(text.substr(at, colon - at));
+        crop.end[a] = number(text.substr(colon + 1, end - colon - 1));
+        at = end + 1;
+    }
+    return crop;
+}
+
+/// "2G", "256M", "1048576".
+std::uint64_t parse_bytes(const std::string& text) {
+    double number = 0;
+    const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const std::string unit(rest, static_cast<std::size_t>(text.data() + text.size() - rest));
+    const std::string units = "KMGT";
+    const bool known = unit.empty() || (units.find(unit[0]) != std::string::npos &&
+                                        (unit.size() == 1 || unit == std::string(1, unit[0]) + "B" ||
+                                         unit == std::string(1, unit[0]) + "iB"));
+    if (error != std::errc() || !known || !(number > 0 && number < 1e15))
+        throw UsageError(fmt::format("--memory: '{}' is not a size such as 2G or 512M", text));
+    const std::size_t power = unit.empty() ? 0 : 10 * (units.find(unit[0]) + 1);
+    return static_cast<std::uint64_t>(number * static_cast<double>(std::uint64_t(1) << power));
+}
+
 /// "2.5" or "2.5,2.5,3".
 std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
     std::vector<double> numbers;
@@ -37,8 +76,17 @@ void MapFlags::add_reading(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--volume", options.mrc.volume, "Which volume of a stack of volumes, from 0")
         ->capture_default_str();
+    app.add_option("--crop", crop, "Part of the map: x0:x1,y0:y1,z0:z1 in voxels from 0, ends not included [all]");
+    app.add_option("--bin", options.bin, "Take the mean of N x N x N voxels as one")->capture_default_str();
     app.add_flag("--invert", options.invert,
                  "Negate the samples: for raw tomograms, where what is dense is dark");
+    static const std::map<std::string, MapReadOptions::Normalise> scales{
+        {"none", MapReadOptions::Normalise::none},
+        {"sigma", MapReadOptions::Normalise::sigma},
+        {"range", MapReadOptions::Normalise::range}};
+    app.add_option("--normalise", options.normalise,
+                   "New units for the densities: sigma (mean 0, rms 1) or range (0 to 1) [none]")
+        ->transform(CLI::CheckedTransformer(scales).description(""));
     app.add_option("--grid", options.grid,
                    "Name of the grid in a VDB file [density, else the first of floats]");
 }
@@ -46,25 +94,38 @@ void MapFlags::add_reading(CLI::App& app) {
 void MapFlags::add_sparsify(CLI::App& app) {
     app.add_option(
         "--threshold", threshold,
-        "Keep samples above this density, in the map's units or as Nsigma (mean + N rms) [keep all]");
+        "Keep samples above this density, in the map's units, as Nsigma (mean + N rms) or as N% (percentile) [keep all]");
+    app.add_option("--keep-fraction", keep_fraction, "Keep this part of the samples, the densest, from 0 to 1");
     app.add_option("--band", options.sparsify.band,
                    "Keep samples within this distance of the threshold, in the map's units [no band]");
     app.add_option(
         "--background", options.sparsify.background,
         "Density of what was dropped, in the map's units [the solvent level: median at the border]");
+    app.add_option("--mask", options.mask, "Keep samples only where this map or VDB file is above 0 [everywhere]");
+    app.add_option("--despeckle", options.despeckle,
+                   "Drop connected pieces of fewer voxels than this, after --threshold and --mask [0]");
+    app.add_option("--halo", options.halo, "Keep this many voxels around what is kept, after --despeckle [0]");
+}
+
+void MapFlags::add_memory(CLI::App& app) {
+    app.add_option("--memory", memory, "Memory that may be taken, such as 2G or 512M [half of the machine's]");
 }
 
 void MapFlags::finish() {
     try {
         if (!threshold.empty()) {
-            const Isovalue level = Isovalue::parse(threshold);
-            if (level.rule == Isovalue::Rule::automatic)
-                throw UsageError("--threshold: a number or Nsigma is needed");
-            if (level.rule == Isovalue::Rule::sigma)
-                options.threshold_sigma = level.number;
+            const ThresholdRule rule = ThresholdRule::parse(threshold);
+            if (rule.kind == ThresholdRule::Kind::value)
+                options.sparsify.threshold = static_cast<float>(rule.number);
             else
-                options.sparsify.threshold = static_cast<float>(level.number);
+                options.threshold = rule;
         }
+        if (keep_fraction) {
+            if (!threshold.empty()) throw UsageError("--threshold and --keep-fraction both say what is kept");
+            options.threshold = ThresholdRule{ThresholdRule::Kind::fraction, *keep_fraction};
+        }
+        if (!crop.empty()) options.crop = parse_crop(crop);
+        if (!memory.empty()) options.memory = parse_bytes(memory);
         if (!voxel_size.empty()) {
             options.mrc.voxel_size_A = parse_triple(voxel_size, true);
             if (!options.mrc.voxel_size_A)

@@ -15,12 +15,15 @@ namespace vdbgeo::app {
 /// Flags whose text is turned into options once all are parsed.
 struct MapFlags {
     MapReadOptions options;
-    std::string threshold, origin = "auto", mode0 = "auto", voxel_size;
+    std::string threshold, origin = "auto", mode0 = "auto", voxel_size, crop, memory;
+    std::optional<double> keep_fraction;
 
     /// How a map is read: frame, modes, volume, grid.
     void add_reading(CLI::App& app);
     /// Which samples are kept.
     void add_sparsify(CLI::App& app);
+    /// How much memory may be taken.
+    void add_memory(CLI::App& app);
     /// Turns texts into options; throws UsageError.
     void finish();
 };

@@ -45,6 +45,7 @@ class RawFile {
         }
         const off_t here = S_ISREG(status.st_mode) ? ::lseek(fd_, 0, SEEK_CUR) : off_t(-1);
         if (here >= 0) size_ = static_cast<std::uint64_t>(std::max<off_t>(status.st_size - here, 0));
+        from_start_ = here == 0;
         while (peeked_ < peek_bytes) {
             const std::size_t n = read_fd(peek_.data() + peeked_, peek_bytes - peeked_);
             if (n == 0) break;
@@ -81,6 +82,7 @@ class RawFile {
     unsigned char peek(std::size_t i) const { return i < peeked_ ? peek_[i] : 0; }
     const std::string& name() const { return name_; }
     std::optional<std::uint64_t> size() const { return size_; }
+    int descriptor() const { return from_start_ ? fd_ : -1; }
 
  private:
     std::size_t read_fd(void* out, std::size_t bytes) {
@@ -100,6 +102,7 @@ class RawFile {
     std::optional<std::uint64_t> size_;
     std::array<unsigned char, peek_bytes> peek_{};
     std::size_t peeked_ = 0, taken_ = 0;
+    bool from_start_ = false;  // a regular file, opened at its beginning
 };
 
 class PlainSource : public ByteSource {
@@ -108,6 +111,7 @@ class PlainSource : public ByteSource {
         : ByteSource(file->name(), ""), file_(std::move(file)) {}
     std::optional<std::uint64_t> length() const override { return file_->size(); }
     std::uint64_t length_bound() const override { return file_->size().value_or(unknown); }
+    int descriptor() const override { return file_->descriptor(); }
 
  protected:
     std::size_t read_some(void* out, std::size_t bytes) override { return file_->read(out, bytes); }

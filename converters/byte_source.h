@@ -31,6 +31,8 @@ class ByteSource {
     virtual std::optional<std::uint64_t> length() const { return std::nullopt; }
     /// No stream of this kind is longer than this, given the bytes that the file has.
     virtual std::uint64_t length_bound() const = 0;
+    /// Descriptor of a plain regular file, whose bytes can be read at any position; else -1.
+    virtual int descriptor() const { return -1; }
     /// "gzip", "bzip2" or "zstd"; empty for a plain file.
     const std::string& compression() const { return compression_; }
     /// The end was met in the middle of the compressed data.

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
-#include <future>
-#include <limits>
 
-#include "converters/vdb_file.h"
+#include "converters/map_passes.h"
+#include "converters/streamed_grid.h"
 #include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
@@ -16,68 +14,68 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Streams all sections of a reader through a builder; one slab is read while the one before is sorted in.
-DensityMap stream(MrcReader& reader, const SparsifyOptions& sparsify, bool invert, const Progress& progress) {
-    const Vec3i size = reader.frame().size;
-    const auto order = reader.order();
-    GridBuilder builder(size, order, sparsify);
-    const std::size_t section =
-        static_cast<std::size_t>(size[order[0]]) * static_cast<std::size_t>(size[order[1]]);
-    const int total = reader.sections_left();
-    Array<float> slab, next;
-    const auto read = [&](Array<float>& into) {
-        const int count = std::min(GridBuilder::slab, reader.sections_left());
-        into.resize(section * static_cast<std::size_t>(count));  // touched only as far as data arrives
-        if (count > 0) reader.read_sections(into.data(), count);
-        if (invert)
-            for (float& v : into) v = -v;
-        return count;
-    };
-    int count = read(slab);
-    for (int done = 0; count > 0;) {
-        auto coming = std::async(std::launch::async, read, std::ref(next));
-        builder.add_sections(slab.data(), count);
-        done += count;
-        count = coming.get();
-        std::swap(slab, next);
-        progress.report(static_cast<double>(done) / total);
-    }
-    return builder.finish(reader.frame());
-}
-
-std::string describe(const fs::path& path, const SparsifyOptions& s, bool invert) {
-    std::string line = "read " + path.filename().string();
-    if (invert) line += " inverted";
-    if (s.threshold && s.band)
-        line += fmt::format(" band {} about {}", *s.band, *s.threshold);
-    else if (s.threshold)
-        line += fmt::format(" threshold {}", *s.threshold);
-    if (s.background) line += fmt::format(" background {}", *s.background);
-    return line;
-}
-
-MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
-    SparsifyOptions sparsify = options.sparsify;
-    double begin = 0;
-    if (options.threshold_sigma) {
-        std::error_code ignored;
-        if (!fs::is_regular_file(path, ignored) && (path == "-" || fs::exists(path, ignored)))
-            throw InvalidInput(fmt::format(
-                "{}: a threshold in sigma takes two readings, and a pipe has one: give it as a value",
-                path == "-" ? "standard input" : path.string()));
-        const Statistics s = mrc_statistics(path, options, progress.part(0, 0.5));
-        sparsify.threshold = static_cast<float>(s.mean + *options.threshold_sigma * s.rms);
-        begin = 0.5;
-    }
-    MrcReader reader(path, options.mrc);
+/// What read_map and stream_map do alike once the samples are sorted.
+MapFile finish(const fs::path& path, MapPasses& passes, const MapReadOptions& options, DensityMap&& map) {
     MapFile result;
-    result.map = stream(reader, sparsify, options.invert, progress.part(begin, 1));
-    result.warnings = reader.warnings();
+    result.map = std::move(map);
+    result.warnings = passes.source().warnings();
     if (result.map.statistics.non_finite > 0)
         result.warnings.push_back(fmt::format("{} samples are not finite numbers; they count as empty",
                                               result.map.statistics.non_finite));
-    store_mrc_metadata(*result.map.grid, reader, path.filename().string());
-    add_history(*result.map.grid, describe(path, sparsify, options.invert));
+    openvdb::MetaMap& meta = *result.map.grid;
+    store_mrc_metadata(meta, passes.source().reader(), path.filename().string());
+    if (options.bin > 1 || options.normalise != MapReadOptions::Normalise::none) {
+        meta.removeMeta("mrc_mode");  // whole numbers no longer
+        meta.insertMeta("mrc_mode", openvdb::Int32Metadata(2));
+    }
+    add_history(*result.map.grid, passes.history());
+    if (passes.source().unpacked() > 0)
+        result.notes.push_back(fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
+                                           static_cast<double>(passes.source().unpacked()) / 1e6,
+                                           passes.passes() > 1 ? fmt::format("{} times", passes.passes()) : "in parts"));
+    if (options.despeckle > 1)
+        result.notes.push_back(fmt::format("{} voxels were in pieces of fewer than {}, and dropped",
+                                           passes.despeckled(), options.despeckle));
+    return result;
+}
+
+/// Frame of the samples, with the word for where it comes from when it is no longer the header's.
+Frame frame_of(MapPasses& passes) { return passes.source().frame(); }
+
+MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
+    MapPasses passes(path, options);
+    const double before = 1 - 1.0 / passes.passes();
+    passes.prepare(progress.part(0, before));
+    GridBuilder builder(passes.sorter().size(), passes.sorter().order(), passes.sparsify(), passes.keep());
+    std::vector<SortedStrip> slab;
+    passes.sort([](SortedStrip&& strip) { return std::move(strip); },
+                [&](std::vector<SortedStrip>&& strips) {
+                    for (SortedStrip& s : strips) slab.push_back(std::move(s));
+                    if (slab.size() < static_cast<std::size_t>(passes.sorter().strips_in_slab())) return;
+                    builder.add_slab(std::move(slab));
+                    slab.clear();
+                },
+                progress.part(before, 1));
+    return finish(path, passes, options, builder.finish(frame_of(passes)));
+}
+
+MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
+    MapFile result;
+    const auto grid = read_vdb(path, options.grid);
+    try {
+        result.map = map_from_grid(grid);
+    } catch (const InvalidInput& e) {
+        throw InvalidInput(fmt::format("{}: grid '{}': {}", path.string(), grid->getName(), e.what()));
+    }
+    result.level_set = grid->getGridClass() == openvdb::GRID_LEVEL_SET;
+    if (options.sparsify.threshold || options.threshold || options.sparsify.background || options.invert ||
+        options.crop || options.bin > 1 || options.normalise != MapReadOptions::Normalise::none ||
+        options.needs_selection())
+        result.warnings.push_back(
+            "the grid of a VDB file is taken as it is: nothing was cropped, binned, inverted, scaled or dropped");
+    if (options.mrc.voxel_size_A || options.mrc.origin != OriginRule::automatic)
+        result.warnings.push_back(
+            "a VDB file lies where its transform says: neither voxel size nor origin was changed");
     return result;
 }
 
@@ -88,48 +86,63 @@ std::string lower_case(std::string text) {
 
 }  // namespace
 
-void MapReadOptions::check() const {
-    mrc.check();
-    sparsify.check();
-    if (threshold_sigma && !std::isfinite(*threshold_sigma))
-        throw InvalidInput("the threshold is not a finite number");
-    if (threshold_sigma && sparsify.threshold)
-        throw InvalidInput("two thresholds, one in sigma and one as a value");
-}
-
 MapFile read_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     options.check();
     if (!is_vdb_file(path)) return read_mrc_map(path, options, progress);
-    MapFile result;
-    const auto grid = read_vdb(path, options.grid);
-    try {
-        result.map = map_from_grid(grid);
-    } catch (const InvalidInput& e) {
-        throw InvalidInput(fmt::format("{}: grid '{}': {}", path.string(), grid->getName(), e.what()));
-    }
-    result.level_set = grid->getGridClass() == openvdb::GRID_LEVEL_SET;
-    const MrcReadOptions& mrc = options.mrc;
-    if (options.sparsify.threshold || options.threshold_sigma || options.sparsify.background ||
-        options.invert)
-        result.warnings.push_back(
-            "the grid of a VDB file is taken as it is: neither threshold nor background nor inversion was "
-            "applied");
-    if (mrc.voxel_size_A || mrc.origin != OriginRule::automatic)
-        result.warnings.push_back(
-            "a VDB file lies where its transform says: neither voxel size nor origin was changed");
+    MapFile result = read_vdb_map(path, options);
     progress.report(1);
     return result;
 }
 
-Statistics mrc_statistics(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
-    MrcReader reader(path, options.mrc);
-    return mrc_statistics(reader, options.invert, progress);
+MapFile stream_map(const fs::path& path, const MapReadOptions& options, const VdbWriteOptions& vdb,
+                   const Progress& progress) {
+    options.check();
+    MapPasses passes(path, options);
+    const double before = 1 - 1.0 / passes.passes();
+    passes.prepare(progress.part(0, before));
+    // The rest of the memory is for the program, the strips at work and the selection.
+    const std::uint64_t limit = options.memory_limit(), reserve = limit / 4 + (std::uint64_t(48) << 20);
+    const std::uint64_t selection = passes.keep() ? passes.keep()->memUsage() : 0;
+    const auto leaves = std::make_shared<PackedLeaves>(
+        passes.sorter(), vdb, limit > reserve + selection ? limit - reserve - selection : 0,
+        options.scratch.empty() ? fs::temp_directory_path() : options.scratch);
+    MapTotals totals;
+    struct Packed {
+        SortedStrip rest;  // without its blocks
+        std::shared_ptr<const PackedLeaves::Row> row;
+    };
+    passes.sort(
+        [&](SortedStrip&& strip) {
+            Packed packed;
+            packed.row = leaves->pack(strip);
+            strip.blocks.clear();
+            packed.rest = std::move(strip);
+            return packed;
+        },
+        [&](std::vector<Packed>&& strips) {
+            std::vector<std::shared_ptr<const PackedLeaves::Row>> rows;
+            for (Packed& p : strips) {
+                totals.add(p.rest);
+                rows.push_back(std::move(p.row));
+            }
+            leaves->add_slab(rows);
+        },
+        progress.part(before, 1));
+    DensityMap map;
+    map.grid = std::make_shared<StreamedGrid>(leaves, totals.background(passes.sorter()));
+    map.frame = frame_of(passes);
+    map.statistics = totals.statistics();
+    store_frame(map);
+    MapFile result = finish(path, passes, options, std::move(map));
+    if (leaves->spilled() > 0)
+        result.notes.push_back(fmt::format("{:.1f} MB of packed leaves went through a temporary file",
+                                           static_cast<double>(leaves->spilled()) / 1e6));
+    return result;
 }
 
-Statistics mrc_statistics(MrcReader& reader, bool invert, const Progress& progress) {
-    SparsifyOptions nothing;  // keeps no sample: only the statistics are wanted
-    nothing.threshold = std::numeric_limits<float>::max();
-    return stream(reader, nothing, invert, progress).statistics;
+Statistics mrc_statistics(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
+    StripSource source(path, options, 1);
+    return strip_statistics(source, progress);
 }
 
 bool is_map_ending(const fs::path& path) {

@@ -55,6 +55,8 @@ enum class OriginRule {
     given  ///< MrcReadOptions::origin_A
 };
 
+struct MrcLayout;  // converters/mrc_layout.h
+
 struct MrcReadOptions {
     enum class Mode0 { automatic, as_signed, as_unsigned };
 
@@ -109,6 +111,15 @@ class MrcReader {
     int sections_left() const;
     /// Reads the next `count` sections, columns fastest, into `out` (count · columns · rows values).
     void read_sections(float* out, int count);
+
+    /// How the samples are stored; for those who take them as they are.
+    const MrcLayout& layout() const;
+    /// Reads the bytes of the next `count` sections into `out`, or passes over them where that is null.
+    void read_raw_sections(void* out, int count);
+    /// Descriptor of a plain file, in which sections can be read in any order from layout().data_start on; else -1.
+    int descriptor() const;
+    /// Bytes that the file holds unpacked come from "gzip", "bzip2" or "zstd"; empty for a plain file.
+    const std::string& compression() const;
 
  private:
     struct State;

@@ -70,6 +70,11 @@ struct MrcReader::State {
                         source->name(), source->cut_off() ? source->compression() + " " : "", layout.data_end,
                         header.nx, header.ny, header.nz, header.mode, source->position()));
     }
+    void check_left(int count) const {
+        if (count < 0 || count > left)
+            throw InvalidInput(
+                fmt::format("{}: {} sections were asked for, {} are left", source->name(), count, left));
+    }
     void fetch(void* out, std::size_t bytes) {
         if (source->read(out, bytes) != bytes) ends_early();
     }
@@ -86,6 +91,10 @@ struct MrcReader::State {
             fetch(scratch.data(), row_bytes(layout.type, n));
             samples_to_float(layout.type, header.swapped, scratch.data(), out + done, n);
         }
+    }
+    void took(int count) {
+        left -= count;
+        if (left == 0 && count > 0) check_end();
     }
     void check_end() {
         if (!layout.last_volume || source->length()) return;
@@ -135,9 +144,7 @@ int MrcReader::sections_left() const { return state_->left; }
 
 void MrcReader::read_sections(float* out, int count) {
     State& s = *state_;
-    if (count < 0 || count > s.left)
-        throw InvalidInput(
-            fmt::format("{}: {} sections were asked for, {} are left", s.source->name(), count, s.left));
+    s.check_left(count);
     const std::uint64_t rows = s.layout.rows * static_cast<std::uint64_t>(count), columns = s.layout.columns;
     if (s.layout.type == SampleType::uint4 && columns % 2 == 1)  // each row ends with half a byte of nothing
         for (std::uint64_t row = 0; row < rows; ++row) s.read_samples(out + row * columns, columns);
@@ -145,8 +152,19 @@ void MrcReader::read_sections(float* out, int count) {
         s.read_samples(out, rows * columns);
     if (s.layout.byte_scaled)
         for (std::uint64_t i = 0; i < rows * columns; ++i) out[i] = s.layout.scale * out[i] + s.layout.shift;
-    s.left -= count;
-    if (s.left == 0 && count > 0) s.check_end();
+    s.took(count);
+}
+
+const MrcLayout& MrcReader::layout() const { return state_->layout; }
+int MrcReader::descriptor() const { return state_->source->descriptor(); }
+const std::string& MrcReader::compression() const { return state_->source->compression(); }
+
+void MrcReader::read_raw_sections(void* out, int count) {
+    State& s = *state_;
+    s.check_left(count);
+    const std::uint64_t bytes = s.layout.section_bytes * static_cast<std::uint64_t>(count);
+    if ((out ? s.source->read(out, bytes) : s.source->skip(bytes)) != bytes) s.ends_early();
+    s.took(count);
 }
 
 }  // namespace vdbgeo

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "converters/self_writing_grid.h"
 #include "converters/vdb_file.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/core/errors.h"
@@ -98,19 +99,26 @@ void replace_identifier(std::ostream& os, const openvdb::GridCPtrVec& grids) {
 
 }  // namespace
 
+std::uint32_t compression_flags(const VdbWriteOptions& options) {
+    std::uint32_t flags = openvdb::io::COMPRESS_ACTIVE_MASK;
+    if (options.compression == VdbWriteOptions::Compression::zip) flags |= openvdb::io::COMPRESS_ZIP;
+    if (options.compression == VdbWriteOptions::Compression::blosc) flags |= openvdb::io::COMPRESS_BLOSC;
+    return flags;
+}
+
 void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std::filesystem::path& path,
                const VdbWriteOptions& options, const Progress& progress) {
     options.check();
     openvdb::initialize();
-    std::uint32_t flags = openvdb::io::COMPRESS_ACTIVE_MASK;
-    if (options.compression == VdbWriteOptions::Compression::zip) flags |= openvdb::io::COMPRESS_ZIP;
-    if (options.compression == VdbWriteOptions::Compression::blosc) flags |= openvdb::io::COMPRESS_BLOSC;
+    const std::uint32_t flags = compression_flags(options);
     openvdb::GridCPtrVec prepared;
     for (std::size_t g = 0; g < grids.size(); ++g) {
         const double from = static_cast<double>(g) / static_cast<double>(grids.size());
         const double to = static_cast<double>(g + 1) / static_cast<double>(grids.size());
         openvdb::GridBase::Ptr grid;
-        if (const auto floats = openvdb::GridBase::grid<FloatGrid>(grids[g]))
+        if (dynamic_cast<const SelfWritingGrid*>(grids[g].get()))
+            grid = std::const_pointer_cast<openvdb::GridBase>(grids[g]);
+        else if (const auto floats = openvdb::GridBase::grid<FloatGrid>(grids[g]))
             grid = std::make_shared<ParallelGrid>(*floats, progress.part(from, to));
         else
             grid = std::const_pointer_cast<openvdb::GridBase>(grids[g]->copyGrid());

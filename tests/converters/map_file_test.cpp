@@ -126,7 +126,7 @@ TEST_F(MapFileTest, AThresholdInSigmaIsTheOneByHand) {
     for (const bool invert : {false, true}) {
         MapReadOptions sigma, value;
         sigma.invert = value.invert = invert;
-        sigma.threshold_sigma = 1.25;
+        sigma.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 1.25};
         const Statistics s = read_map(path, value).map.statistics;
         value.sparsify.threshold = static_cast<float>(s.mean + 1.25 * s.rms);
         const MapFile a = read_map(path, sigma), b = read_map(path, value);
@@ -174,7 +174,7 @@ TEST_F(MapFileTest, OptionsThatHaveNoMeaningForAVdbFileAreWarnedOf) {
     write_vdb({test::map_from_values(Vec3i(9, 9, 9), test::noise(729, 1)).grid}, folder_ / "a.vdb");
     MapReadOptions threshold, sigma, background, invert, voxel, origin;
     threshold.sparsify.threshold = 0.1f;
-    sigma.threshold_sigma = 1;
+    sigma.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 1};
     background.sparsify.background = 0;
     invert.invert = true;
     voxel.mrc.voxel_size_A = Vec3d(2, 2, 2);
@@ -212,7 +212,7 @@ TEST_F(MapFileTest, AFaultThatTheReaderMeetsOnTheWayIsTheCallers) {
 TEST_F(MapFileTest, CancellingStopsInTheMiddle) {
     const auto path = file(noise_bytes().str());
     MapReadOptions plain, sigma;
-    sigma.threshold_sigma = 1;
+    sigma.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 1};
     for (const MapReadOptions* o : {&plain, &sigma})
         for (const double at : {0.1, 0.6, 0.9}) {
             double last = 0;
@@ -225,16 +225,16 @@ TEST_F(MapFileTest, CancellingStopsInTheMiddle) {
 TEST_F(MapFileTest, BadOptionsAndFilesAreRefused) {
     const auto path = file(noise_bytes().str());
     MapReadOptions two, odd, grid, sigma;
-    two.threshold_sigma = 1;
+    two.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 1};
     two.sparsify.threshold = 1.f;
     EXPECT_TRUE(contains(refusal(path, two), "two thresholds"));
-    odd.threshold_sigma = INFINITY;
+    odd.threshold = ThresholdRule{ThresholdRule::Kind::sigma, INFINITY};
     EXPECT_NE(refusal(path, odd), "");
     write_vdb({test::map_from_values(Vec3i(9, 9, 9), test::noise(729, 1)).grid}, folder_ / "a.vdb");
     grid.grid = "other";
     EXPECT_TRUE(contains(refusal(folder_ / "a.vdb", grid), "no grid 'other' among 'density'"));
     EXPECT_THROW(read_map(folder_ / "none.mrc"), IoError);
-    sigma.threshold_sigma = 1;
+    sigma.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 1};
     EXPECT_THROW(read_map(folder_ / "none.mrc", sigma), IoError);
     EXPECT_TRUE(contains(refusal("-", sigma), "standard input: a threshold in sigma takes two readings"));
     auto frustum = openvdb::FloatGrid::create();
@@ -274,7 +274,7 @@ TEST(MapFile, StatisticsOfRealMaps) {
         VDBGEO_NEEDS_DATA(k.name);
         for (const bool sparse : {false, true}) {
             MapReadOptions options;
-            if (sparse) options.threshold_sigma = 2;
+            if (sparse) options.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 2};
             const Statistics s = read_map(test::data_folder() / k.name, options).map.statistics;
             EXPECT_EQ(s.count, k.count) << k.name;
             EXPECT_EQ(s.non_finite, 0u);

@@ -2,29 +2,11 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <vector>
 
-#include "vdbgeo/volume/density_map.h"
+#include "vdbgeo/volume/sparsify.h"
 
 namespace vdbgeo {
-
-/// Which samples a sparse grid keeps. With neither field set every sample is kept, and going back to a dense
-/// file gives the same bits.
-struct SparsifyOptions {
-    /// Keep samples above this value; the rest reads as the background, and so does what is not finite.
-    std::optional<float> threshold;
-    /// Keep samples within `band` of `threshold` (which is then the isovalue). What lies above the band is
-    /// not active and reads as the band's upper end, so the surface at the isovalue is unchanged.
-    std::optional<float> band;
-    /// The value of what was dropped: the solvent level, not above the threshold. Unset: the median over the
-    /// faces of the box (of about a million of their samples, where there are more), but not above the
-    /// threshold (or the band's lower end).
-    std::optional<float> background;
-
-    /// Throws InvalidInput when the fields contradict each other.
-    void check() const;
-};
 
 /// Builds a map from dense sections handed over one slab after another, so that no dense copy of the volume
 /// is ever held. Leaves are filled in parallel; the result does not depend on the number of threads.
@@ -40,22 +22,29 @@ class GridBuilder {
     static constexpr int slab = 8;
 
     /// `size`: samples along x, y, z. `order[0]` is the axis (0 x, 1 y, 2 z) that runs fastest in the data,
-    /// `order[2]` the slowest: sections follow one another along it.
-    GridBuilder(const Vec3i& size, const std::array<int, 3>& order, const SparsifyOptions& options = {});
-    ~GridBuilder();
-    GridBuilder(const GridBuilder&) = delete;
-    GridBuilder& operator=(const GridBuilder&) = delete;
+    /// `order[2]` the slowest: sections follow one another along it. `keep`: as for StripSorter.
+    GridBuilder(const Vec3i& size, const std::array<int, 3>& order, const SparsifyOptions& options = {},
+                const openvdb::MaskTree* keep = nullptr);
 
     /// The next `count` sections. Throws InvalidInput when more come than `size` allows.
     void add_sections(const float* data, int count);
+
+    /// The strips of one slab, from the first row to the last: for a caller that sorts them itself.
+    void add_slab(std::vector<SortedStrip>&& strips);
+    const StripSorter& sorter() const { return sorter_; }
 
     /// The map, with statistics over all samples handed over; once. Throws InvalidInput when sections are
     /// missing.
     DensityMap finish(const Frame& frame);
 
  private:
-    struct State;
-    std::unique_ptr<State> state_;
+    void fill_background(float background);
+
+    StripSorter sorter_;
+    MapTotals totals_;
+    int slabs_done_ = 0;
+    openvdb::FloatGrid::Ptr grid_ = openvdb::FloatGrid::create(StripSorter::unknown_background);
+    std::vector<leaf::Leaf*> leaves_;  // owned by the grid's tree
 };
 
 }  // namespace vdbgeo

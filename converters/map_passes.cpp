@@ -1,0 +1,232 @@
+#include "converters/map_passes.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "converters/map_file.h"
+#include "converters/vdb_file.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/components.h"
+#include "vdbgeo/volume/order_statistic.h"
+
+namespace vdbgeo {
+namespace {
+
+using openvdb::Coord;
+using openvdb::MaskTree;
+
+constexpr std::uint64_t mask_leaf_bytes = sizeof(MaskTree::LeafNodeType) + 16;
+
+bool wants_statistics(const MapReadOptions& o) {
+    return o.normalise != MapReadOptions::Normalise::none ||
+           (o.threshold && o.threshold->kind == ThresholdRule::Kind::sigma);
+}
+
+bool wants_percentile(const MapReadOptions& o) {
+    return o.threshold && (o.threshold->kind == ThresholdRule::Kind::percentile ||
+                           o.threshold->kind == ThresholdRule::Kind::fraction);
+}
+
+/// The samples of a strip's row as floats.
+const float* row_of(const Strip& strip, int section, int row, Array<float>& space) {
+    const std::size_t at = static_cast<std::size_t>(section) * strip.section_stride +
+                           static_cast<std::size_t>(row) * strip.row_stride;
+    if (strip.floats) return strip.floats + at;
+    space.resize(static_cast<std::size_t>(strip.columns));
+    for (std::size_t i = 0; i < space.size(); ++i)
+        space[i] = static_cast<float>(strip.sign * (strip.integers[at + i] + strip.bias));
+    return space.data();
+}
+
+/// Puts the active voxels of a sorted map into a mask.
+void add_voxels(const std::vector<SortedStrip>& strips, MaskTree& mask) {
+    for (const SortedStrip& strip : strips)
+        for (const SortedBlock& block : strip.blocks) {
+            if (block.leaf)
+                mask.addLeaf(new MaskTree::LeafNodeType(*block.leaf, openvdb::TopologyCopy()));
+            else if (block.tile == SortedBlock::Tile::kept)
+                mask.addTile(1, block.origin, true, true);
+        }
+}
+
+}  // namespace
+
+int MapPasses::passes_before(const MapReadOptions& o) {
+    return (wants_statistics(o) ? 1 : 0) + (wants_percentile(o) ? OrderStatistic::passes : 0) +
+           (o.needs_selection() && (o.threshold || o.sparsify.threshold) ? 1 : 0);
+}
+
+MapPasses::MapPasses(const std::filesystem::path& path, const MapReadOptions& options)
+    : name_(path == "-" ? "standard input" : path.string()),
+      file_(path.filename().string()),
+      options_(options),
+      sparsify_(options.sparsify),
+      source_(path, options, passes_before(options) + 1),
+      size_(source_.frame().size) {}
+
+int MapPasses::passes() const { return passes_before(options_) + 1; }
+
+/// Strips that are packed at a time.
+int MapPasses::group() const {
+    const auto& order = source_.order();
+    const std::uint64_t strip = std::uint64_t(4) * leaf::dim * leaf::dim * static_cast<std::uint64_t>(size_[order[0]]);
+    const std::uint64_t fit = options_.memory_limit() / 8 / strip;
+    return static_cast<int>(std::min<std::uint64_t>(std::max<std::uint64_t>(fit / 16 * 16, 16), 1 << 20));
+}
+
+void MapPasses::find_statistics(const Progress& progress) {
+    statistics_ = strip_statistics(source_, progress);
+}
+
+void MapPasses::find_percentile(const Progress& progress) {
+    const ThresholdRule& rule = *options_.threshold;
+    const bool percentile = rule.kind == ThresholdRule::Kind::percentile;
+    OrderStatistic order(percentile ? rule.number / 100 : 1 - rule.number);
+    for (int pass = 0; pass < OrderStatistic::passes && !order.done(); ++pass) {
+        source_.pass(
+            [&](const Strip& strip, int, int, std::size_t) {
+                Array<float> space;
+                for (int s = 0; s < strip.sections; ++s)
+                    for (int r = 0; r < strip.rows; ++r)
+                        order.add(row_of(strip, s, r, space), static_cast<std::size_t>(strip.columns));
+            },
+            [](std::size_t) {}, [] {}, progress.part(0.5 * pass, 0.5 * (pass + 1)));
+        order.end_pass();
+    }
+    if (order.count() == 0) throw InvalidInput(name_ + ": the map has no finite sample to take a threshold from");
+    sparsify_.threshold = order.value();
+}
+
+void MapPasses::check_memory(const MaskTree& mask) const {
+    const std::uint64_t needed = 2 * mask.leafCount() * mask_leaf_bytes;
+    if (needed > options_.memory_limit())
+        throw NumericalError(fmt::format(
+            "{}: the mask of what is kept takes {} MB, more than the memory allowed; raise --threshold or --memory, or --bin",
+            name_, needed >> 20));
+}
+
+MaskTree::Ptr MapPasses::voxels_above(const SparsifyOptions& what, const Progress& progress) {
+    auto mask = std::make_shared<MaskTree>();
+    sorter_ = std::make_unique<StripSorter>(size_, source_.order(), what);
+    int seen = 0;
+    sort([](SortedStrip&& strip) { return std::move(strip); },
+         [&](const std::vector<SortedStrip>& strips) {
+             add_voxels(strips, *mask);
+             if (++seen % 64 == 0) check_memory(*mask);
+         },
+         progress);
+    check_memory(*mask);
+    return mask;
+}
+
+/// Where the mask file is above 0.
+MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
+    const std::string name = options_.mask.string();
+    SparsifyOptions positive;
+    positive.threshold = 0.f;
+    if (is_vdb_file(options_.mask)) {
+        const auto grid = read_vdb(options_.mask);
+        auto mask = std::make_shared<MaskTree>();
+        for (auto it = grid->cbeginValueOn(); it; ++it) {
+            if (!(*it > 0)) continue;
+            if (it.isVoxelValue())
+                mask->setValueOn(it.getCoord());
+            else
+                mask->fill(it.getBoundingBox(), true);
+        }
+        return mask;
+    }
+    MapReadOptions options;
+    options.memory = options_.memory;
+    options.scratch = options_.scratch;
+    options.sparsify = positive;
+    const Vec3i size = MrcReader(options_.mask).frame().size, whole = source_.reader().frame().size;
+    if (size == whole) {
+        options.crop = options_.crop;
+        options.bin = options_.bin;
+    } else if (size != size_) {
+        throw InvalidInput(fmt::format("{}: the mask has {} x {} x {} samples, the map {} x {} x {}", name, size[0],
+                                       size[1], size[2], whole[0], whole[1], whole[2]));
+    }
+    MapPasses passes(options_.mask, options);
+    return passes.voxels_above(positive, progress);
+}
+
+void MapPasses::select(const Progress& progress) {
+    MaskTree::Ptr mask;
+    if (sparsify_.threshold) mask = voxels_above(sparsify_, progress.part(0, 0.6));
+    if (!options_.mask.empty()) {
+        const auto allowed = read_mask(progress.part(0.6, 0.8));
+        if (mask)
+            mask->topologyIntersection(*allowed);
+        else
+            mask = allowed;
+    }
+    if (options_.despeckle > 1) {
+        despeckled_ = remove_small_components(*mask, options_.despeckle, progress.part(0.8, 0.9));
+    }
+    const openvdb::CoordBBox box(Coord(0), Coord(size_.x() - 1, size_.y() - 1, size_.z() - 1));
+    grow(*mask, options_.halo, box);
+    check_memory(*mask);
+    mask->prune();
+    keep_ = mask;
+}
+
+void MapPasses::prepare(const Progress& progress) {
+    const double share = 1.0 / std::max(1, passes_before(options_));
+    double done = 0;
+    const auto next = [&](int passes) {
+        const double from = done;
+        done = std::min(1.0, done + share * passes);
+        return progress.part(from, done);
+    };
+    if (wants_statistics(options_)) {
+        find_statistics(next(1));
+        Statistics& s = *statistics_;
+        if (s.count == s.non_finite) throw InvalidInput(name_ + ": the map has no finite sample");
+        const bool sigma = options_.normalise == MapReadOptions::Normalise::sigma;
+        if (options_.normalise != MapReadOptions::Normalise::none) {
+            const double shift = sigma ? s.mean : s.min, spread = sigma ? s.rms : s.max - s.min;
+            if (!(spread > 0)) throw InvalidInput(name_ + ": all samples are equal: they cannot be normalised");
+            source_.scale(shift, 1 / spread);
+            for (double* v : {&s.min, &s.max, &s.mean}) *v = (*v - shift) / spread;
+            s.rms /= spread;
+        }
+        if (options_.threshold && options_.threshold->kind == ThresholdRule::Kind::sigma)
+            sparsify_.threshold = static_cast<float>(s.mean + options_.threshold->number * s.rms);
+    }
+    if (options_.threshold && options_.threshold->kind == ThresholdRule::Kind::value)
+        sparsify_.threshold = static_cast<float>(options_.threshold->number);
+    if (wants_percentile(options_)) find_percentile(next(2));
+    sparsify_.check();
+    if (options_.needs_selection()) select(next(1));
+    sorter_ = std::make_unique<StripSorter>(size_, source_.order(), sparsify_, keep_.get());
+}
+
+std::string MapPasses::history() const {
+    const MapReadOptions& o = options_;
+    std::string line = "read " + file_;
+    if (o.crop) {
+        std::string ranges;
+        for (std::size_t a = 0; a < 3; ++a)
+            ranges += fmt::format("{}{}:{}", a ? "," : "", o.crop->begin[a] ? std::to_string(*o.crop->begin[a]) : "",
+                                  o.crop->end[a] ? std::to_string(*o.crop->end[a]) : "");
+        line += " cropped " + ranges;
+    }
+    if (o.bin > 1) line += fmt::format(" binned {}", o.bin);
+    if (o.invert) line += " inverted";
+    if (o.normalise == MapReadOptions::Normalise::sigma) line += " normalised sigma";
+    if (o.normalise == MapReadOptions::Normalise::range) line += " normalised range";
+    if (sparsify_.threshold && sparsify_.band)
+        line += fmt::format(" band {} about {}", *sparsify_.band, *sparsify_.threshold);
+    else if (sparsify_.threshold)
+        line += fmt::format(" threshold {}", *sparsify_.threshold);
+    if (sparsify_.background) line += fmt::format(" background {}", *sparsify_.background);
+    if (!o.mask.empty()) line += " mask " + o.mask.filename().string();
+    if (o.despeckle > 1) line += fmt::format(" despeckle {}", o.despeckle);
+    if (o.halo > 0) line += fmt::format(" halo {}", o.halo);
+    return line;
+}
+
+}  // namespace vdbgeo

@@ -31,7 +31,7 @@ RoundingError half_rounding_error(const openvdb::FloatTree::LeafNodeType& leaf);
 void check_half_range(const RoundingError& half_error);
 void check_half_range(const openvdb::FloatGrid& grid);
 
-/// The largest power of two that is not above `requested`. Throws InvalidInput outside 2^-126 … 2^104
+/// The largest power of two that is not above `requested`. Throws InvalidInput outside 2^-126 … 2^103
 /// (1.2e-38 … 1.0e31), beyond which multiples of it are not exact.
 float quantisation_step(double requested);
 

@@ -47,6 +47,7 @@ struct Ended {
     double seconds = 0;
     std::uint64_t peak_bytes = 0;  ///< largest resident memory; the caller's own counts if that is larger
     bool signalled = false;        ///< the signal was sent before the end
+    double seconds_signalled = 0;  ///< when, after the start
 };
 
 namespace run_detail {
@@ -89,7 +90,9 @@ inline Ended run(const std::vector<std::string>& command, const RunOptions& opti
     std::array<std::string*, 2> texts{&result.out, &result.err};
     std::array<pollfd, 2> watched{pollfd{pipes[0][0], POLLIN, 0}, pollfd{pipes[1][0], POLLIN, 0}};
     const auto send = [&](int signal) {
-        if (!std::exchange(result.signalled, true)) ::kill(pid, signal);
+        if (std::exchange(result.signalled, true)) return;
+        result.seconds_signalled = std::chrono::duration<double>(clock::now() - start).count();
+        ::kill(pid, signal);
     };
     while (watched[0].fd >= 0 || watched[1].fd >= 0) {
         ::poll(watched.data(), watched.size(), 5);

@@ -3,6 +3,7 @@
 
 #include "apps/command.h"
 #include "apps/flags.h"
+#include "apps/map_output.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
@@ -35,10 +36,10 @@ void convert_map(const ConvertOptions& o, Session& session) {
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     if (in.map.grid->activeVoxelCount() == 0)
-        throw NumericalError(
-            fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
-                        o.in, in.map.statistics.min, in.map.statistics.max));
-    write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
+        throw NumericalError(fmt::format(
+            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold", o.in,
+            in.map.statistics.min, in.map.statistics.max));
+    const auto written = write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();
     Json j{{"in", o.in}, {"out", o.out}};
@@ -50,6 +51,7 @@ void convert_map(const ConvertOptions& o, Session& session) {
             fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB",
                         o.out, j["active_voxels"].dump(), j["bytes_in_memory"].get<double>() / 1e6,
                         j["dense_bytes"].get<double>() / 1e6));
+    if (written) report_written(o.out, *written, j, session);
     session.result(j);
 }
 
@@ -69,7 +71,8 @@ Command convert_command() {
                 auto o = std::make_shared<ConvertOptions>();
                 app.add_option("in", o->in, "Map, grid or mesh file; - reads a map from a pipe")->required();
                 app.add_option("out", o->out,
-                               "File to write: .vdb; .mrc .map .ccp4 .rec; .ply .obj .off .stl; - is an MRC "
+                               "File to write: .vdb; .mrc .map .ccp4 .rec, also with .gz; .ply .obj .off "
+                               ".stl; - is an MRC "
                                "map for a pipe")
                     ->required();
                 o->map.add_reading(app);
@@ -77,6 +80,7 @@ Command convert_command() {
                 add_vdb_flags(app, o->vdb);
                 app.add_option("--mode", o->mrc.mode,
                                "MRC mode to write: 0, 1, 2, 6, 12 or 101 [the input's, else 2]");
+                add_map_output_flags(app, o->mrc);
                 return [o](Session& session) {
                     o->map.finish();
                     check_usage(o->mrc);

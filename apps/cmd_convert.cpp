@@ -55,11 +55,19 @@ void convert_map(const ConvertOptions& o, Session& session) {
     session.result(j);
 }
 
+/// Nothing is asked for that a grid would have to be loaded for, or warned of.
+bool taken_as_it_is(const MapReadOptions& o) {
+    return !o.sparsify.threshold && !o.sparsify.band && !o.threshold_sigma && !o.sparsify.background &&
+           !o.invert && !o.mrc.voxel_size_A && o.mrc.origin == OriginRule::automatic;
+}
+
 void run_convert(const ConvertOptions& o, Session& session) {
     if (is_mesh_ending(o.in)) return convert_mesh(o, session);
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
     check_map_output(o.out, session);
+    if (!is_vdb_ending(o.out) && taken_as_it_is(o.map.options) && is_vdb_file(o.in))
+        return convert_grid_to_map(o.in, o.out, o.map.options.grid, o.mrc, session);
     convert_map(o, session);
 }
 

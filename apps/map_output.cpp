@@ -4,6 +4,10 @@
 
 #include <cstdlib>
 
+#include "apps/reports.h"
+#include "converters/vdb_sections.h"
+#include "vdbgeo/core/errors.h"
+
 namespace vdbgeo::app {
 namespace {
 
@@ -34,6 +38,23 @@ void set_scaling(const std::string& text, MrcWriteOptions& options) {
     options.given = *scaling;
 }
 
+/// As grid_json; the statistics are those of the numbers in the map file.
+Json unloaded_grid_json(const VdbSections& source, const Statistics& written) {
+    DensityMap map;
+    map.grid = std::const_pointer_cast<openvdb::FloatGrid>(source.grid().copy());
+    map.frame = source.frame();
+    map.statistics = written;
+    Json j = grid_json(map);
+    const openvdb::CoordBBox& box = source.active_box();
+    j["active_voxels"] = source.active_voxels();
+    j["leaves"] = source.leaves();
+    j["bytes_in_memory"] = source.memory();
+    j["dense_bytes"] = 4 * written.count;
+    j["active_box_min"] = {box.min().x(), box.min().y(), box.min().z()};
+    j["active_box_max"] = {box.max().x(), box.max().y(), box.max().z()};
+    return j;
+}
+
 }  // namespace
 
 void add_map_output_flags(CLI::App& app, MrcWriteOptions& options) {
@@ -55,6 +76,29 @@ void report_written(const std::string& path, const MrcWriteReport& report, Json&
     if (session.json || session.quiet || (!report.scaling && report.largest_error == 0)) return;
     session.say(fmt::format("{}: mode {}, density = {} * stored + {}, largest error {:.3g}", path,
                             report.mode, scaling.factor, scaling.offset, report.largest_error));
+}
+
+void convert_grid_to_map(const std::string& in, const std::string& out,
+                         const std::optional<std::string>& grid, const MrcWriteOptions& options,
+                         Session& session) {
+    Json seconds;
+    Clock clock;
+    const VdbSections source(in, grid);
+    seconds["read"] = clock.lap();
+    if (source.active_voxels() == 0)
+        throw NumericalError(fmt::format("{}: no sample is kept: the grid has no active voxel", in));
+    const MrcWriteReport report = write_mrc(source, out, options, session.stage("writing"));
+    seconds["write"] = clock.lap();
+    session.end_stage();
+    Json j{{"in", in}, {"out", out}};
+    j.update(unloaded_grid_json(source, report.statistics));
+    j["warnings"] = Json::array();
+    j["seconds"] = seconds;
+    if (!session.json && !session.quiet)
+        session.say(fmt::format("{}: {} active voxels, {:.1f} MB of samples", out, source.active_voxels(),
+                                j["dense_bytes"].get<double>() / 1e6));
+    report_written(out, report, j, session);
+    session.result(j);
 }
 
 }  // namespace vdbgeo::app

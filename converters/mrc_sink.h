@@ -68,9 +68,10 @@ MrcWriteReport write_sections(const DenseSections& source, MrcSink& sink, const 
 
 /// What write_mrc does, wherever the samples come from: `meta` holds the record of the file that the map came
 /// from, `sections` makes the source once the box and the order of the axes are known.
-MrcWriteReport write_mrc_from(const openvdb::MetaMap& meta, const Frame& frame, const openvdb::CoordBBox& active,
-                              const std::filesystem::path& path, const MrcWriteOptions& options,
-                              const std::function<DenseSections(const MrcBox&, const std::array<int, 3>&)>& sections,
-                              const Progress& progress);
+MrcWriteReport write_mrc_from(
+    const openvdb::MetaMap& meta, const Frame& frame, const openvdb::CoordBBox& active,
+    const std::filesystem::path& path, const MrcWriteOptions& options,
+    const std::function<DenseSections(const MrcBox&, const std::array<int, 3>&)>& sections,
+    const Progress& progress);
 
 }  // namespace vdbgeo

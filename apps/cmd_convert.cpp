@@ -3,6 +3,7 @@
 
 #include "apps/command.h"
 #include "apps/flags.h"
+#include "apps/map_output.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
@@ -42,10 +43,10 @@ void convert_map(const ConvertOptions& o, Session& session) {
     if (!session.quiet)
         for (const std::string& note : in.notes) session.say(o.in + ": " + note);
     if (in.map.grid->activeVoxelCount() == 0)
-        throw NumericalError(
-            fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
-                        o.in, in.map.statistics.min, in.map.statistics.max));
-    write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
+        throw NumericalError(fmt::format(
+            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold", o.in,
+            in.map.statistics.min, in.map.statistics.max));
+    const auto written = write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();
     Json j{{"in", o.in}, {"out", o.out}};
@@ -58,7 +59,15 @@ void convert_map(const ConvertOptions& o, Session& session) {
             fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB",
                         o.out, j["active_voxels"].dump(), j["bytes_in_memory"].get<double>() / 1e6,
                         j["dense_bytes"].get<double>() / 1e6));
+    if (written) report_written(o.out, *written, j, session);
     session.result(j);
+}
+
+/// Nothing is asked for that a grid would have to be loaded for, or warned of.
+bool taken_as_it_is(const MapReadOptions& o) {
+    return !o.sparsify.threshold && !o.sparsify.band && !o.threshold && !o.sparsify.background && !o.crop && o.bin == 1 &&
+           o.normalise == MapReadOptions::Normalise::none && !o.quantise && !o.needs_selection() &&
+           !o.invert && !o.mrc.voxel_size_A && o.mrc.origin == OriginRule::automatic;
 }
 
 void run_convert(const ConvertOptions& o, Session& session) {
@@ -66,6 +75,8 @@ void run_convert(const ConvertOptions& o, Session& session) {
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
     check_map_output(o.out, session);
+    if (!is_vdb_ending(o.out) && taken_as_it_is(o.map.options) && is_vdb_file(o.in))
+        return convert_grid_to_map(o.in, o.out, o.map.options.grid, o.mrc, session);
     convert_map(o, session);
 }
 
@@ -77,7 +88,8 @@ Command convert_command() {
                 auto o = std::make_shared<ConvertOptions>();
                 app.add_option("in", o->in, "Map, grid or mesh file; - reads a map from a pipe")->required();
                 app.add_option("out", o->out,
-                               "File to write: .vdb; .mrc .map .ccp4 .rec; .ply .obj .off .stl; - is an MRC "
+                               "File to write: .vdb; .mrc .map .ccp4 .rec, also with .gz; .ply .obj .off "
+                               ".stl; - is an MRC "
                                "map for a pipe")
                     ->required();
                 o->map.add_reading(app);
@@ -86,6 +98,7 @@ Command convert_command() {
                 add_vdb_flags(app, o->vdb);
                 app.add_option("--mode", o->mrc.mode,
                                "MRC mode to write: 0, 1, 2, 6, 12 or 101 [the input's, else 2]");
+                add_map_output_flags(app, o->mrc);
                 return [o](Session& session) {
                     o->map.finish();
                     check_usage(o->mrc);

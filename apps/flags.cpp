@@ -104,6 +104,9 @@ void MapFlags::add_sparsify(CLI::App& app) {
     app.add_option("--mask", options.mask, "Keep samples only where this map or VDB file is above 0 [everywhere]");
     app.add_option("--despeckle", options.despeckle,
                    "Drop connected pieces of fewer voxels than this, after --threshold and --mask [0]");
+    app.add_option("--quantise", quantise,
+                   "Round what is kept to multiples of a power of two up to this, in the map's units or as Nsigma: "
+                   "smaller files [no]");
     app.add_option("--halo", options.halo, "Keep this many voxels around what is kept, after --despeckle [0]");
 }
 
@@ -124,6 +127,7 @@ void MapFlags::finish() {
             if (!threshold.empty()) throw UsageError("--threshold and --keep-fraction both say what is kept");
             options.threshold = ThresholdRule{ThresholdRule::Kind::fraction, *keep_fraction};
         }
+        if (!quantise.empty()) options.quantise = ThresholdRule::parse(quantise);
         if (!crop.empty()) options.crop = parse_crop(crop);
         if (!memory.empty()) options.memory = parse_bytes(memory);
         if (!voxel_size.empty()) {

@@ -15,7 +15,7 @@ namespace vdbgeo::app {
 /// Flags whose text is turned into options once all are parsed.
 struct MapFlags {
     MapReadOptions options;
-    std::string threshold, origin = "auto", mode0 = "auto", voxel_size, crop, memory;
+    std::string quantise, threshold, origin = "auto", mode0 = "auto", voxel_size, crop, memory;
     std::optional<double> keep_fraction;
 
     /// How a map is read: frame, modes, volume, grid.

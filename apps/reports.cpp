@@ -1,4 +1,5 @@
 #include "apps/reports.h"
+#include "converters/streamed_grid.h"
 
 #include <Eigen/Core>
 #include <fmt/format.h>
@@ -141,7 +142,8 @@ Json grid_json(const DensityMap& map) {
     Json j;
     j["name"] = grid.getName();
     j["active_voxels"] = grid.activeVoxelCount();
-    j["leaves"] = grid.constTree().leafCount();
+    const auto* streamed = dynamic_cast<const StreamedGrid*>(&grid);
+    j["leaves"] = streamed ? streamed->leaves().leaves() : grid.constTree().leafCount();
     j["bytes_in_memory"] = grid.memUsage();
     j["dense_bytes"] = static_cast<std::uint64_t>(4 * extent.prod());
     j["background"] = grid.background();

@@ -35,19 +35,20 @@ void take_output(Session& session) {
 
 void check_map_output(const std::string& path, Session& session) {
     if (path == "-") return take_output(session);
-    for (const char* packed : {".gz", ".bz2", ".zst"})
+    for (const char* packed : {".bz2", ".zst", ".vdb.gz"})
         if (has_ending(path, packed))
-            throw UsageError(fmt::format("{}: maps are written plain; compress the file afterwards", path));
+            throw UsageError(
+                fmt::format("{}: maps are written plain or as .mrc.gz; compress the file afterwards", path));
     if (!is_vdb_ending(path) && !is_map_ending(path))
         throw UsageError(fmt::format("{}: the ending tells the format: .vdb or .mrc .map .ccp4 .rec", path));
 }
 
-void write_map(const DensityMap& map, const std::string& path, const VdbWriteOptions& vdb,
-               const MrcWriteOptions& mrc, const Progress& progress) {
-    if (is_vdb_ending(path))
-        write_vdb({map.grid}, path, vdb, progress);
-    else
-        write_mrc(map, path, mrc, progress);
+std::optional<MrcWriteReport> write_map(const DensityMap& map, const std::string& path,
+                                        const VdbWriteOptions& vdb, const MrcWriteOptions& mrc,
+                                        const Progress& progress) {
+    if (!is_vdb_ending(path)) return write_mrc(map, path, mrc, progress);
+    write_vdb({map.grid}, path, vdb, progress);
+    return std::nullopt;
 }
 
 DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress) {

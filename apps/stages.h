@@ -1,6 +1,7 @@
 // Steps that several commands share: they read files, call the library, and say what they found.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "apps/session.h"
@@ -37,13 +38,15 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
 /// For a command that writes a file to standard output; UsageError with --json, which wants it too.
 void take_output(Session& session);
 
-/// UsageError unless a map can be written under this name: .vdb, the endings of map files without those of
-/// compression, or "-", which is an MRC file on standard output.
+/// UsageError unless a map can be written under this name: .vdb, the endings of map files, with .gz or plain,
+/// or
+/// "-", which is an MRC file on standard output.
 void check_map_output(const std::string& path, Session& session);
 
-/// Writes a map in the format that the name tells.
-void write_map(const DensityMap& map, const std::string& path, const VdbWriteOptions& vdb,
-               const MrcWriteOptions& mrc, const Progress& progress);
+/// Writes a map in the format that the name tells; what there is to say of an MRC file comes back.
+std::optional<MrcWriteReport> write_map(const DensityMap& map, const std::string& path,
+                                        const VdbWriteOptions& vdb, const MrcWriteOptions& mrc,
+                                        const Progress& progress);
 
 /// A phantom as a map, with its noise or without.
 DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progress);

@@ -17,6 +17,19 @@ constexpr std::array<int, 3> leaf_step{64, 8, 1};
 
 }  // namespace
 
+DenseSections::DenseSections(const openvdb::FloatGrid& grid, const Vec3i& first, const Vec3i& size,
+                             const std::array<int, 3>& order)
+    : DenseSections(
+          [&grid] {
+              return LeafLookup(
+                  [accessor = grid.getConstAccessor()](const openvdb::Coord& corner, float& tile) {
+                      const auto* node = accessor.probeConstLeaf(corner);
+                      if (!node) tile = accessor.getValue(corner);
+                      return node ? node->buffer().data() : nullptr;
+                  });
+          },
+          first, size, order) {}
+
 int DenseSections::piece(int section) const {
     const int start = first_[order_[2]] + section;
     return std::min(leaf_start(start) + leaf - start, size_[order_[2]] - section);
@@ -41,15 +54,14 @@ void DenseSections::fill_row_of_leaves(int section, int row_leaf, float* out) co
     const int s_begin = first_[s] + section, s_end = s_begin + piece(section);
     const int r_begin = std::max(row_leaf, first_[r]),
               r_end = std::min(row_leaf + leaf, first_[r] + size_[r]);
-    const auto accessor = grid_.getConstAccessor();
+    const LeafLookup lookup = leaves_();
     for (int column_leaf = leaf_start(first_[c]); column_leaf < first_[c] + size_[c]; column_leaf += leaf) {
         const int c_begin = std::max(column_leaf, first_[c]);
         const int c_end = std::min(column_leaf + leaf, first_[c] + size_[c]);
         openvdb::Coord corner;
         corner[c] = column_leaf, corner[r] = row_leaf, corner[s] = leaf_start(s_begin);
-        const auto* node = accessor.probeConstLeaf(corner);
-        const float* values = node ? node->buffer().data() : nullptr;
-        const float tile = node ? 0 : accessor.getValue(corner);
+        float tile = 0;
+        const float* values = lookup(corner, tile);
         for (int si = s_begin; si < s_end; ++si)
             for (int ri = r_begin; ri < r_end; ++ri) {
                 float* to =

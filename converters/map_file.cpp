@@ -24,11 +24,12 @@ MapFile finish(const fs::path& path, MapPasses& passes, const MapReadOptions& op
                                               result.map.statistics.non_finite));
     openvdb::MetaMap& meta = *result.map.grid;
     store_mrc_metadata(meta, passes.source().reader(), path.filename().string());
-    if (options.bin > 1 || options.normalise != MapReadOptions::Normalise::none) {
+    if (options.bin > 1 || options.normalise != MapReadOptions::Normalise::none || options.quantise) {
         meta.removeMeta("mrc_mode");  // whole numbers no longer
         meta.insertMeta("mrc_mode", openvdb::Int32Metadata(2));
     }
     add_history(*result.map.grid, passes.history());
+    result.quantisation = passes.sparsify().quantisation;
     if (passes.source().unpacked() > 0)
         result.notes.push_back(fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
                                            static_cast<double>(passes.source().unpacked()) / 1e6,
@@ -38,9 +39,6 @@ MapFile finish(const fs::path& path, MapPasses& passes, const MapReadOptions& op
                                            passes.despeckled(), options.despeckle));
     return result;
 }
-
-/// Frame of the samples, with the word for where it comes from when it is no longer the header's.
-Frame frame_of(MapPasses& passes) { return passes.source().frame(); }
 
 MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     MapPasses passes(path, options);
@@ -56,7 +54,10 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
                     slab.clear();
                 },
                 progress.part(before, 1));
-    return finish(path, passes, options, builder.finish(frame_of(passes)));
+    DensityMap map = builder.finish(passes.source().frame());
+    MapFile result = finish(path, passes, options, std::move(map));
+    result.rounding = builder.totals().rounding();
+    return result;
 }
 
 MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
@@ -77,6 +78,14 @@ MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
         result.warnings.push_back(
             "a VDB file lies where its transform says: neither voxel size nor origin was changed");
     return result;
+}
+
+void naming_half(const fs::path& path, const RoundingError& error) {
+    try {
+        check_half_range(error);
+    } catch (const InvalidInput& e) {
+        throw InvalidInput(path.string() + ": " + e.what());
+    }
 }
 
 std::string lower_case(std::string text) {
@@ -128,12 +137,15 @@ MapFile stream_map(const fs::path& path, const MapReadOptions& options, const Vd
             leaves->add_slab(rows);
         },
         progress.part(before, 1));
+    if (vdb.half) naming_half(path, leaves->half_error());
     DensityMap map;
     map.grid = std::make_shared<StreamedGrid>(leaves, totals.background(passes.sorter()));
-    map.frame = frame_of(passes);
+    map.frame = passes.source().frame();
     map.statistics = totals.statistics();
     store_frame(map);
     MapFile result = finish(path, passes, options, std::move(map));
+    result.rounding = totals.rounding();
+    result.half_error = leaves->half_error();
     if (leaves->spilled() > 0)
         result.notes.push_back(fmt::format("{:.1f} MB of packed leaves went through a temporary file",
                                            static_cast<double>(leaves->spilled()) / 1e6));

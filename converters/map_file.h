@@ -16,6 +16,9 @@ struct MapFile {
     DensityMap map;
     bool level_set = false;             ///< a VDB level set: inside is negative, the surface at 0
     std::vector<std::string> warnings;  ///< what is odd about the file, one line each
+    std::optional<float> quantisation;  ///< the step that values were rounded to
+    RoundingError rounding;             ///< what that cost
+    RoundingError half_error;           ///< what storing them as 16-bit floats costs (stream_map)
     std::vector<std::string> notes;     ///< what was done that the user may want to know, one line each
 };
 

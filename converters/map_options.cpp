@@ -48,6 +48,12 @@ void MapReadOptions::check() const {
         threshold->check();
         if (sparsify.threshold) throw InvalidInput("two thresholds: one as a value, one as a rule");
     }
+    if (quantise) {
+        quantise->check();
+        if (!(quantise->number > 0) ||
+            (quantise->kind != ThresholdRule::Kind::value && quantise->kind != ThresholdRule::Kind::sigma))
+            throw InvalidInput("a step of quantisation is above 0: a value, or a number of sigmas");
+    }
     if (sparsify.band && needs_selection())
         throw InvalidInput("a band keeps what is near the isovalue: it cannot be joined with a mask, despeckling or a halo");
     if (needs_selection() && mask.empty() && !threshold && !sparsify.threshold)

@@ -62,6 +62,9 @@ struct MapReadOptions {
     /// Keep all samples within this many voxels (along each axis) of what is kept. 0: none.
     int halo = 0;
 
+    /// Round what is kept to multiples of the largest power of two that is not above this: a value or sigmas.
+    std::optional<ThresholdRule> quantise;
+
     std::optional<std::string>
         grid;  ///< name of the grid in a VDB file; unset: "density", else the first of floats
     /// Bytes of memory that the whole process may take; unset: half of the machine's.

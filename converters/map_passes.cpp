@@ -20,7 +20,8 @@ constexpr std::uint64_t mask_leaf_bytes = sizeof(MaskTree::LeafNodeType) + 16;
 
 bool wants_statistics(const MapReadOptions& o) {
     return o.normalise != MapReadOptions::Normalise::none ||
-           (o.threshold && o.threshold->kind == ThresholdRule::Kind::sigma);
+           (o.threshold && o.threshold->kind == ThresholdRule::Kind::sigma) ||
+           (o.quantise && o.quantise->kind == ThresholdRule::Kind::sigma);
 }
 
 bool wants_percentile(const MapReadOptions& o) {
@@ -199,6 +200,10 @@ void MapPasses::prepare(const Progress& progress) {
     if (options_.threshold && options_.threshold->kind == ThresholdRule::Kind::value)
         sparsify_.threshold = static_cast<float>(options_.threshold->number);
     if (wants_percentile(options_)) find_percentile(next(2));
+    if (options_.quantise) {
+        const bool sigma = options_.quantise->kind == ThresholdRule::Kind::sigma;
+        sparsify_.quantisation = quantisation_step(options_.quantise->number * (sigma ? statistics_->rms : 1));
+    }
     sparsify_.check();
     if (options_.needs_selection()) select(next(1));
     sorter_ = std::make_unique<StripSorter>(size_, source_.order(), sparsify_, keep_.get());
@@ -226,6 +231,7 @@ std::string MapPasses::history() const {
     if (!o.mask.empty()) line += " mask " + o.mask.filename().string();
     if (o.despeckle > 1) line += fmt::format(" despeckle {}", o.despeckle);
     if (o.halo > 0) line += fmt::format(" halo {}", o.halo);
+    if (sparsify_.quantisation) line += fmt::format(" quantised {}", *sparsify_.quantisation);
     return line;
 }
 

@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "vdbgeo/core/errors.h"
 
@@ -18,7 +19,7 @@ namespace {
     throw IoError(fmt::format("{}: {}: {}", name, doing, std::strerror(errno)));
 }
 
-/// Closes the descriptor on every way out; a mapping outlives it.
+/// Closes the descriptor on every way out but the one that takes it.
 struct Descriptor {
     int number;
     ~Descriptor() {
@@ -30,7 +31,7 @@ struct Descriptor {
 
 MappedFile::MappedFile(const std::filesystem::path& path)
     : name_(path == "-" ? "standard input" : path.string()) {
-    const Descriptor file{path == "-" ? ::dup(STDIN_FILENO) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+    Descriptor file{path == "-" ? ::dup(STDIN_FILENO) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
     if (file.number < 0) fail(name_, "cannot be opened");
     struct stat status {};
     if (::fstat(file.number, &status) != 0) fail(name_, "cannot be opened");
@@ -46,10 +47,36 @@ MappedFile::MappedFile(const std::filesystem::path& path)
     mapping_ = mapping;
     data_ = static_cast<const char*>(mapping);
     ::madvise(mapping, size_, MADV_SEQUENTIAL);
+    descriptor_ = std::exchange(file.number, -1);
 }
 
 MappedFile::~MappedFile() {
     if (mapping_) ::munmap(mapping_, size_);
+    if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void MappedFile::read_at(std::uint64_t position, void* out, std::size_t bytes) const {
+    if (position > size_ || bytes > size_ - position)
+        throw IoError(
+            fmt::format("{}: bytes {} to {} lie beyond its end", name_, position, position + bytes));
+    if (descriptor_ < 0) {
+        std::memcpy(out, data_ + position, bytes);
+        return;
+    }
+    char* to = static_cast<char*>(out);
+    while (bytes > 0) {
+        const ssize_t n = ::pread(descriptor_, to, bytes, static_cast<off_t>(position));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) fail(name_, "reading failed");
+        if (n == 0) throw IoError(fmt::format("{}: became shorter while it was read", name_));
+        to += n;
+        bytes -= static_cast<std::size_t>(n);
+        position += static_cast<std::uint64_t>(n);
+    }
+}
+
+void MappedFile::release() const {
+    if (mapping_) ::madvise(mapping_, size_, MADV_DONTNEED);
 }
 
 void MappedFile::read_pipe(int descriptor) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -21,6 +22,11 @@ class MappedFile {
     MappedFile& operator=(const MappedFile&) = delete;
 
     std::string_view bytes() const { return {data_, size_}; }
+    /// Copies bytes out without touching the mapping: memory that is mapped and looked at counts as the
+    /// program's until it is released. From any thread. Throws IoError where the file has become shorter.
+    void read_at(std::uint64_t position, void* out, std::size_t bytes) const;
+    /// Gives back the memory that looking at the bytes took; they can be looked at again.
+    void release() const;
     /// What error messages call the file.
     const std::string& name() const { return name_; }
 
@@ -28,6 +34,7 @@ class MappedFile {
     void read_pipe(int descriptor);
 
     std::string name_;
+    int descriptor_ = -1;  // of a regular file
     const char* data_ = nullptr;
     std::size_t size_ = 0;
     void* mapping_ = nullptr;

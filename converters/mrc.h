@@ -137,25 +137,52 @@ void store_mrc_metadata(openvdb::MetaMap& meta, const MrcReader& reader, const s
 /// once, so it cannot be a pipe. Errors as MrcReader.
 std::vector<std::string> validate_mrc(const std::filesystem::path& path);
 
+/// What stored numbers mean: value = factor · stored + offset.
+struct MrcScaling {
+    double factor = 1, offset = 0;
+};
+
 struct MrcWriteOptions {
+    enum class Compress { by_name, gz };
+    enum class Scaling {
+        none,       ///< values are stored as they are
+        automatic,  ///< modes 0, 1, 6, 101: the range of the values becomes the whole range of the mode; mode
+                    ///< 12: scaled only where a value lies beyond ±65504; mode 2: none
+        given  ///< MrcWriteOptions::given
+    };
+
     /// 0, 1, 2, 6, 12 or 101. Unset: the mode of the file that the map came from (metadata mrc_mode), else 2.
     std::optional<int> mode;
+    Compress compress = Compress::by_name;  ///< by_name: gzip where the name ends in .gz, else plain
+    Scaling scaling = Scaling::none;
+    MrcScaling given;  ///< for Scaling::given; not in mode 2, which holds every value
 
     void check() const;
 };
 
-/// Writes a map as MRC2014, section by section through AtomicFile: dropped voxels get their stored value, the
+/// What was written, as a reader of the file finds it.
+struct MrcWriteReport {
+    int mode = 2;
+    std::optional<MrcScaling> scaling;  ///< unset: the stored numbers are the values
+    double largest_error = 0;           ///< of value − (factor · stored + offset), over all finite values
+    Statistics statistics;              ///< of the stored numbers
+};
+
+/// Writes a map as MRC2014, section by section through MrcSink: dropped voxels get their stored value, the
 /// axes the order of the file that the map came from (metadata mrc_axes), so that an unsparsified map gives
-/// back the same data bytes. The name's ending .gz, .bz2 or .zst is not honoured: the file is plain.
-/// A bounded frame gives the box, else the box is that of the active voxels and the origin moves with it.
-/// Cell, labels, space group, machine stamp and recomputed statistics are set. A map whose position came from
-/// NSTART gets it back there, as long as it still lies on whole steps; else the position goes into ORIGIN and
-/// NSTART is kept as it was. In integer modes values must be whole numbers in range, in mode 12 not beyond
-/// ±65504: InvalidInput otherwise (nothing is scaled silently). Axes that are turned against x, y, z beyond
-/// what cell angles express have no place in an MRC header: InvalidInput. Bytes that were read as unsigned
-/// are written so, under IMOD's stamp. The data is gone through twice, for the statistics and for the file,
-/// with eight sections in memory.
-void write_mrc(const DensityMap& map, const std::filesystem::path& path, const MrcWriteOptions& options = {},
-               const Progress& progress = {});
+/// back the same data bytes. A name ending in .gz, or MrcWriteOptions::compress, makes it a gzip file,
+/// compressed on all threads; .bz2 and .zst are not honoured: the file is plain. The name "-" is standard
+/// output. A bounded frame gives the box, else the box is that of the active voxels and the origin moves with
+/// it. Cell, labels, space group, machine stamp and recomputed statistics are set. A map whose position came
+/// from NSTART gets it back there, as long as it still lies on whole steps; else the position goes into
+/// ORIGIN and NSTART is kept as it was. In integer modes values must be whole numbers in range, in mode 12
+/// not beyond ±65504: InvalidInput otherwise, unless a scaling is asked for. Then stored = round((value −
+/// offset)/factor), and a label says so: "vdbgeo: density = FACTOR * stored + OFFSET", to the last bit; MRC
+/// has no word for it, readers show the stored numbers. Axes that are turned against x, y, z beyond what cell
+/// angles express have no place in an MRC header: InvalidInput. Bytes that were read as unsigned are written
+/// so, under IMOD's stamp. The data is gone through once; once more for the range of an automatic scaling,
+/// and once more for the statistics where the output is a pipe; with eight sections in memory.
+MrcWriteReport write_mrc(const DensityMap& map, const std::filesystem::path& path,
+                         const MrcWriteOptions& options = {}, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "vdbgeo/core/parallel.h"
 
@@ -50,11 +51,20 @@ void join(Part& all, const Part& part) {
 
 }  // namespace
 
-void RunningStatistics::add(const float* values, std::size_t count) {
-    const Part piece = fixed_order_reduce(
-        count, 1 << 16, Part(),
-        [&](std::size_t begin, std::size_t end) { return part_of(values + begin, values + end); }, join);
-    join(all_, piece);
+void RunningStatistics::add_pieces(const float* values, std::size_t piece, std::size_t pieces) {
+    constexpr std::size_t block = 1 << 16;
+    const std::size_t blocks = (piece + block - 1) / block;
+    std::vector<Part> parts(blocks * pieces);
+    parallel_for(parts.size(), 1, [&](std::size_t i) {
+        const std::size_t begin = i % blocks * block;
+        const float* from = values + i / blocks * piece;
+        parts[i] = part_of(from + begin, from + std::min(begin + block, piece));
+    });
+    for (std::size_t p = 0; p < pieces; ++p) {
+        Part sum;
+        for (std::size_t b = 0; b < blocks; ++b) join(sum, parts[p * blocks + b]);
+        join(all_, sum);
+    }
 }
 
 Statistics RunningStatistics::result() const {

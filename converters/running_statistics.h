@@ -12,7 +12,9 @@ namespace vdbgeo {
 /// block's own mean and joined after Chan, Golub and LeVeque (1983), so a large mean costs no accuracy.
 class RunningStatistics {
  public:
-    void add(const float* values, std::size_t count);
+    void add(const float* values, std::size_t count) { add_pieces(values, count, 1); }
+    /// The same as add(…, piece) for each of `pieces` pieces that lie one behind the other.
+    void add_pieces(const float* values, std::size_t piece, std::size_t pieces);
     Statistics result() const;
 
     /// Sums over some of the samples.

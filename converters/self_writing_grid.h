@@ -1,14 +1,16 @@
-// For grids that know how they are written.
+// A grid that knows how to write itself.
 #pragma once
 
 #include "converters/vdb_file.h"
 
 namespace vdbgeo {
 
-/// A grid with this base is handed to OpenVDB's archive as it is: its own writeTopology and writeBuffers make
-/// the bytes.
+/// Marks grids that write_vdb writes as they are, by their own writeTopology and writeBuffers: neither copied
+/// nor wrapped, whatever the options say of half floats.
 struct SelfWritingGrid {
     virtual ~SelfWritingGrid() = default;
+    /// Where to tell how far the writing is.
+    virtual void report_to(const Progress&) const {}
 };
 
 /// The flags of OpenVDB's file format that `options` stand for.

@@ -46,6 +46,7 @@ struct PackedLeaves::Row {
     std::string body;
     std::uint64_t leaves = 0, active = 0;
     openvdb::CoordBBox box;
+    RoundingError half_error;
 };
 
 struct PackedLeaves::Node {
@@ -100,6 +101,7 @@ std::shared_ptr<const PackedLeaves::Row> PackedLeaves::pack(const SortedStrip& s
             head.bytes = static_cast<std::uint32_t>(end - written);
             written = end;
             ++row->leaves;
+            if (options_.half) row->half_error.join(half_rounding_error(*block.leaf));
             row->active += mask.countOn();
             block.leaf->evalActiveBoundingBox(row->box);
         } else if (block.tile == SortedBlock::Tile::kept) {
@@ -145,6 +147,7 @@ void PackedLeaves::add_slab(const std::vector<std::shared_ptr<const Row>>& rows)
         leaves_ += row->leaves;
         active_ += row->active;
         if (!row->box.empty()) box_.expand(row->box);
+        half_error_.join(row->half_error);
     }
 }
 
@@ -279,6 +282,7 @@ StreamedGrid::StreamedGrid(std::shared_ptr<const PackedLeaves> leaves, float bac
     : openvdb::FloatGrid(background), leaves_(std::move(leaves)) {
     setName("density");
     setGridClass(openvdb::GRID_UNKNOWN);
+    setSaveFloatAsHalf(leaves_->half());
 }
 
 }  // namespace vdbgeo

@@ -6,6 +6,7 @@
 
 #include "converters/scratch_file.h"
 #include "converters/self_writing_grid.h"
+#include "vdbgeo/volume/rounding.h"
 #include "vdbgeo/volume/sparsify.h"
 
 namespace vdbgeo {
@@ -32,6 +33,9 @@ class PackedLeaves {
     /// What the grid would take in memory as a tree.
     std::uint64_t bytes_as_tree() const;
     std::uint64_t spilled() const { return store_.spilled(); }
+    bool half() const { return options_.half; }
+    /// What storing 16-bit floats costs, where that is asked for.
+    const RoundingError& half_error() const { return half_error_; }
 
     void write_topology(std::ostream& os, float background) const;
     void write_buffers(std::ostream& os, const Progress& progress) const;
@@ -61,6 +65,7 @@ class PackedLeaves {
     ByteStore store_;
     std::uint64_t leaves_ = 0, active_ = 0;
     openvdb::CoordBBox box_;
+    RoundingError half_error_;
 };
 
 /// PackedLeaves as a grid: metadata and transform as of any grid; the tree is empty, and only the counts, the
@@ -78,12 +83,12 @@ class StreamedGrid : public openvdb::FloatGrid, public SelfWritingGrid {
     openvdb::GridBase::Ptr copyGrid() override { return std::make_shared<StreamedGrid>(*this); }
     openvdb::GridBase::ConstPtr copyGrid() const override { return std::make_shared<StreamedGrid>(*this); }
 
-    void report_to(const Progress& progress) { progress_ = progress; }
+    void report_to(const Progress& progress) const override { progress_ = progress; }
     const PackedLeaves& leaves() const { return *leaves_; }
 
  private:
     std::shared_ptr<const PackedLeaves> leaves_;
-    Progress progress_;
+    mutable Progress progress_;  // it does not change the grid
 };
 
 }  // namespace vdbgeo

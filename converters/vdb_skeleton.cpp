@@ -4,6 +4,7 @@
 
 #include <sstream>
 
+#include "converters/vdb_checksum.h"
 #include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
@@ -33,13 +34,15 @@ openvdb::Metadata::Ptr value_of(VdbCursor& cursor, const std::string& name, cons
     return made;
 }
 
-openvdb::MetaMap metadata(VdbCursor& cursor) {
+/// `checksum_at`: where the value of the checksum begins, if there is one.
+openvdb::MetaMap metadata(VdbCursor& cursor, std::uint64_t* checksum_at = nullptr) {
     const auto count = cursor.number<std::uint32_t>("number of metadata entries");
     if (count > cursor.left() / 12) cursor.fail(fmt::format("{} metadata entries", count));
     openvdb::MetaMap map;
     for (std::uint32_t i = 0; i < count; ++i) {
         const std::string name = cursor.string("name of a metadata entry");
         const std::string type = cursor.string("type of a metadata entry");
+        if (checksum_at && name == vdb_checksum_key) *checksum_at = cursor.at() + 4;  // behind its length
         try {
             if (const auto value = value_of(cursor, name, type)) map.insertMeta(name, *value);
         } catch (const openvdb::Exception& e) {
@@ -110,9 +113,15 @@ void VdbCursor::seek(std::uint64_t position) {
 
 const char* VdbCursor::take(std::uint64_t bytes, const char* what) {
     if (bytes > left()) fail(fmt::format("the file ends inside: {} ({} bytes needed)", what, bytes));
+    if (tidy_ && at_ - released_ >= (16u << 20)) release();
     const char* begin = bytes_.data() + at_;
     at_ += bytes;
     return begin;
+}
+
+void VdbCursor::release() {
+    file_.release();  // all of it: what is looked at again comes back on its own
+    released_ = at_;
 }
 
 std::string VdbCursor::string(const char* what) {
@@ -134,8 +143,10 @@ VdbSkeleton walk_vdb(VdbCursor& cursor) {
     if (offsets_flag > 1)
         cursor.fail(fmt::format("the flag for grid offsets is {}, not 0 or 1", offsets_flag));
     skeleton.streamed = offsets_flag == 0;
-    cursor.take(36, "identifier");
-    metadata(cursor);
+    const std::string identifier(cursor.take(36, "identifier"), 36);
+    std::uint64_t checksum_at = 0;
+    const auto checksum =
+        metadata(cursor, &checksum_at).getMetadata<openvdb::StringMetadata>(vdb_checksum_key);
     const auto count = cursor.number<std::int32_t>("number of grids");
     if (count < 1 || count > 100000) cursor.fail(fmt::format("{} grids", count));
     for (int g = 0; g < count; ++g) {
@@ -147,6 +158,7 @@ VdbSkeleton walk_vdb(VdbCursor& cursor) {
     }
     cursor.enter("");
     if (cursor.left() != 0) cursor.fail(fmt::format("{} bytes behind the last grid", cursor.left()));
+    if (checksum) verify_vdb(cursor.file(), identifier, checksum->value(), checksum_at);
     return skeleton;
 }
 

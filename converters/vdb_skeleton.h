@@ -15,13 +15,17 @@ namespace vdbgeo {
 /// Reads on through the bytes of a VDB file; what would lie beyond the end is an error.
 class VdbCursor {
  public:
-    explicit VdbCursor(const MappedFile& file) : bytes_(file.bytes()), name_(file.name()) {}
+    /// `tidy`: memory is given back behind the cursor, so that a walk through the file takes some 20 MB of
+    /// it.
+    explicit VdbCursor(const MappedFile& file, bool tidy = false)
+        : file_(file), bytes_(file.bytes()), name_(file.name()), tidy_(tidy) {}
 
     /// Throws InvalidInput that tells `what` is wrong and where.
     [[noreturn]] void fail(const std::string& what) const;
     /// Whose bytes these are, for the messages.
     void enter(const std::string& grid) { grid_ = grid; }
 
+    const MappedFile& file() const { return file_; }
     const std::string& name() const { return name_; }
     std::uint64_t at() const { return at_; }
     std::uint64_t left() const { return bytes_.size() - at_; }
@@ -40,9 +44,13 @@ class VdbCursor {
     }
 
  private:
+    void release();
+
+    const MappedFile& file_;
     std::string_view bytes_;
     std::string name_, grid_;
-    std::uint64_t at_ = 0;
+    std::uint64_t at_ = 0, released_ = 0;
+    bool tidy_;
 };
 
 /// One grid of a file: what its descriptor and its metadata say.
@@ -75,9 +83,23 @@ struct VdbTreeLayout {
     std::vector<std::uint64_t> chunk_at;  ///< where the buffers of every 256th leaf begin
 };
 
+/// What a walk through a tree comes past, in the order of the file.
+class VdbTreeVisitor {
+ public:
+    virtual ~VdbTreeVisitor() = default;
+    virtual void background(const char* value) = 0;
+    virtual void root_tile(const openvdb::Coord& origin, const char* value, bool active) = 0;
+    /// An internal node: level 2 has 32³ children, each a node of level 1; level 1 has 16³ leaves. Masks have
+    /// a bit for each child; the values lie from byte `values_at` to `end`.
+    virtual void node(int level, const openvdb::Coord& origin, std::string_view children,
+                      std::string_view active, std::uint64_t values_at, std::uint64_t end) = 0;
+    /// The buffer of the next leaf: its mask of active voxels, and where it lies, beginning with that mask.
+    virtual void leaf(std::string_view mask, std::uint64_t at, std::uint64_t end) = 0;
+};
+
 /// Walks a grid's transform and tree, node by node, and leaves the cursor behind it: masks, the flags and
 /// sizes of compressed blocks, positions and order of nodes. Cost: one pass over the grid's bytes, of which
 /// only the heads of the blocks are looked at, and 8 bytes of memory for every 64 leaves.
-VdbTreeLayout check_vdb_tree(VdbCursor& cursor, const VdbEntry& entry);
+VdbTreeLayout check_vdb_tree(VdbCursor& cursor, const VdbEntry& entry, VdbTreeVisitor* visitor = nullptr);
 
 }  // namespace vdbgeo

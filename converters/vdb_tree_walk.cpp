@@ -16,6 +16,7 @@ namespace io = openvdb::io;
 
 constexpr std::uint64_t leaf_voxels = 512;
 constexpr std::int32_t root_step = 4096;                  // voxels along a child of the root
+constexpr std::int32_t lower_step = 128;                  // and along a child of that
 constexpr std::int32_t furthest = std::int32_t(1) << 30;  // so that sizes of boxes fit 32 bits
 
 struct ValueType {
@@ -32,7 +33,8 @@ constexpr std::array<ValueType, 7> value_types{{{"Tree_float_5_4_3", 4, 2},
 
 class TreeWalk {
  public:
-    TreeWalk(VdbCursor& cursor, const VdbEntry& entry) : c_(cursor), entry_(entry) {
+    TreeWalk(VdbCursor& cursor, const VdbEntry& entry, VdbTreeVisitor* visitor)
+        : c_(cursor), entry_(entry), visitor_(visitor) {
         for (const ValueType& type : value_types)
             if (entry.info.type == type.tree || entry.info.type == std::string(type.tree) + "_HalfFloat") {
                 bytes_ = type.bytes;
@@ -63,6 +65,9 @@ class TreeWalk {
     }
 
  private:
+    using Position = std::array<std::int32_t, 3>;
+    static openvdb::Coord coord(const Position& p) { return {p[0], p[1], p[2]}; }
+
     static constexpr std::uint64_t mask_bytes = leaf_voxels / 8;
 
     // The leaves of one lower node: where their masks begin, and how many there are (at most 4096).
@@ -113,29 +118,33 @@ class TreeWalk {
     void root() {
         const auto buffers = c_.number<std::int32_t>("number of buffers");
         if (buffers != 1) c_.fail(fmt::format("{} buffers a leaf", buffers));
-        c_.take(bytes_, "background");
+        const char* background = c_.take(bytes_, "background");
+        if (visitor_) visitor_->background(background);
         const auto tiles = c_.number<std::uint32_t>("number of tiles");
         const auto children = c_.number<std::uint32_t>("number of nodes");
         if (tiles > c_.left() / (13 + bytes_)) c_.fail(fmt::format("{} tiles", tiles));
-        std::set<std::array<std::int32_t, 3>> seen;
+        std::set<Position> seen;
         for (std::uint32_t i = 0; i < tiles; ++i) {
-            if (!seen.insert(position()).second) c_.fail("two tiles in one place");
-            c_.take(bytes_, "tile");
-            if (c_.number<std::uint8_t>("tile") > 1) c_.fail("a tile is neither active nor inactive");
+            const Position here = position();
+            if (!seen.insert(here).second) c_.fail("two tiles in one place");
+            const char* value = c_.take(bytes_, "tile");
+            const auto active = c_.number<std::uint8_t>("tile");
+            if (active > 1) c_.fail("a tile is neither active nor inactive");
+            if (visitor_) visitor_->root_tile(coord(here), value, active != 0);
         }
-        std::array<std::int32_t, 3> last{INT32_MIN, INT32_MIN, INT32_MIN};
+        Position last{INT32_MIN, INT32_MIN, INT32_MIN};
         for (std::uint32_t i = 0; i < children; ++i) {
-            const auto here = position();
+            const Position here = position();
             // OpenVDB reads the voxels in the order of the positions, whatever that of the nodes was.
             if (here <= last) c_.fail("nodes out of order");
             if (seen.count(here) != 0) c_.fail("a tile and a node in one place");
             last = here;
-            upper_node();
+            upper_node(coord(here));
         }
     }
 
-    std::array<std::int32_t, 3> position() {
-        std::array<std::int32_t, 3> p;
+    Position position() {
+        Position p;
         for (std::int32_t& v : p) {
             v = c_.number<std::int32_t>("position of a node");
             if (v % root_step != 0 || v < -furthest || v > furthest)
@@ -144,32 +153,43 @@ class TreeWalk {
         return p;
     }
 
-    void upper_node() {
-        for (std::uint64_t left = count_on(node_head(32768)); left > 0; --left) lower_node();
+    void upper_node(const openvdb::Coord& origin) {
+        const std::string_view children = node_head(2, 32768, origin);
+        for (std::size_t byte = 0; byte < children.size(); ++byte)
+            for (std::size_t bit = 0; bit < 8; ++bit)
+                if (children[byte] >> bit & 1) {
+                    const int n = static_cast<int>(8 * byte + bit);  // z runs fastest
+                    lower_node(origin.offsetBy(lower_step * (n >> 10), lower_step * (n >> 5 & 31),
+                                               lower_step * (n & 31)));
+                }
     }
 
-    void lower_node() {
-        const std::uint64_t leaves = count_on(node_head(4096));
+    void lower_node(const openvdb::Coord& origin) {
+        const std::uint64_t leaves = count_on(node_head(1, 4096, origin));
         if (leaves == 0) return;
         leaf_masks_.push_back(pack(c_.at(), leaves));
         c_.take(leaves * mask_bytes, "masks of leaves");
     }
 
     /// Masks and values of an internal node; the mask of its children comes back.
-    std::string_view node_head(std::uint64_t slots) {
+    std::string_view node_head(int level, std::uint64_t slots, const openvdb::Coord& origin) {
         const std::string_view children(c_.take(slots / 8, "mask of a node"), slots / 8);
         const std::string_view active(c_.take(slots / 8, "mask of a node"), slots / 8);
         for (std::size_t i = 0; i < children.size(); ++i)
             if ((children[i] & active[i]) != 0) c_.fail("the masks of a node contradict each other");
+        const std::uint64_t values_at = c_.at();
         values(active);
+        if (visitor_) visitor_->node(level, origin, children, active, values_at, c_.at());
         return children;
     }
 
     void leaf(const char* mask_in_topology) {
+        const std::uint64_t begin = c_.at();
         const std::string_view mask(c_.take(mask_bytes, "mask of a leaf"), mask_bytes);
         if (std::memcmp(mask.data(), mask_in_topology, mask_bytes) != 0)
             c_.fail("a leaf's two masks of active voxels are not the same");
         values(mask);
+        if (visitor_) visitor_->leaf(mask, begin, c_.at());
     }
 
     /// The values of a node: a flag that tells which inactive ones were left out, those, and one block.
@@ -222,6 +242,7 @@ class TreeWalk {
 
     VdbCursor& c_;
     const VdbEntry& entry_;
+    VdbTreeVisitor* visitor_;
     std::uint64_t bytes_ = 0, stored_bytes_ = 0;
     bool half_ = false;
     std::vector<std::uint64_t> leaf_masks_;
@@ -229,8 +250,8 @@ class TreeWalk {
 
 }  // namespace
 
-VdbTreeLayout check_vdb_tree(VdbCursor& cursor, const VdbEntry& entry) {
-    return TreeWalk(cursor, entry).walk();
+VdbTreeLayout check_vdb_tree(VdbCursor& cursor, const VdbEntry& entry, VdbTreeVisitor* visitor) {
+    return TreeWalk(cursor, entry, visitor).walk();
 }
 
 }  // namespace vdbgeo

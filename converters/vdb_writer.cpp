@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/io/io.h>
 #include <tbb/parallel_pipeline.h>
 
@@ -7,6 +8,7 @@
 #include <sstream>
 
 #include "converters/self_writing_grid.h"
+#include "converters/vdb_checksum.h"
 #include "converters/vdb_file.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/core/errors.h"
@@ -74,12 +76,16 @@ class ParallelGrid : public FloatGrid {
 class Writer : public openvdb::io::Archive {
  public:
     openvdb::io::Archive::Ptr copy() const override { return std::make_shared<Writer>(*this); }
-    void write_to(std::ostream& os, const openvdb::GridCPtrVec& grids) const { write(os, grids, true, {}); }
+    void write_to(std::ostream& os, const openvdb::GridCPtrVec& grids) const {
+        openvdb::MetaMap metadata;
+        metadata.insertMeta(vdb_checksum_key, openvdb::StringMetadata(blank_vdb_checksum()));
+        write(os, grids, true, metadata);
+    }
 };
 
 /// The identifier in the header is random: another one every time. Readers only compare it with that of a
 /// file they have open, so a name-based one serves, and the same input gives the same bytes.
-void replace_identifier(std::ostream& os, const openvdb::GridCPtrVec& grids) {
+std::string identifier_of(const openvdb::GridCPtrVec& grids) {
     std::uint64_t hash[2] = {0xCBF29CE484222325ull, 0x9AE16A3B2F90404Full};
     for (const auto& grid : grids) {
         const std::string text =
@@ -87,14 +93,42 @@ void replace_identifier(std::ostream& os, const openvdb::GridCPtrVec& grids) {
         for (const char c : text)
             for (auto& h : hash) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001B3ull + (h >> 29);
     }
-    const std::string id =
-        fmt::format("{:08x}-{:04x}-4{:03x}-8{:03x}-{:012x}", hash[0] >> 32, hash[0] >> 16 & 0xFFFF,
-                    hash[0] & 0xFFF, hash[1] >> 52, hash[1] & 0xFFFFFFFFFFFFull);
-    constexpr std::streamoff identifier_at =
-        8 + 4 + 8 + 1;  // signature, version, library version, offsets flag
-    os.seekp(identifier_at);
-    os.write(id.data(), static_cast<std::streamsize>(id.size()));
-    os.seekp(0, std::ios::end);
+    return fmt::format("{:08x}-{:04x}-4{:03x}-8{:03x}-{:012x}", hash[0] >> 32, hash[0] >> 16 & 0xFFFF,
+                       hash[0] & 0xFFF, hash[1] >> 52, hash[1] & 0xFFFFFFFFFFFFull);
+}
+
+/// Keeps OpenVDB from adding notes for delayed loading, for which it would compress every leaf once more:
+/// half the time of writing. Files without them, as OpenVDB 4 wrote them, are read by all.
+class NoDelayedLoadNotes {
+ public:
+    NoDelayedLoadNotes() : registered_(Notes::isRegisteredType()) {
+        if (registered_) Notes::unregisterType();
+    }
+    ~NoDelayedLoadNotes() {
+        if (registered_) Notes::registerType();
+    }
+    NoDelayedLoadNotes(const NoDelayedLoadNotes&) = delete;
+    NoDelayedLoadNotes& operator=(const NoDelayedLoadNotes&) = delete;
+
+ private:
+    using Notes = openvdb::io::DelayedLoadMetadata;
+    bool registered_;
+};
+
+/// What the archive writes in the place of a grid.
+openvdb::GridBase::ConstPtr prepared(const openvdb::GridBase::ConstPtr& grid, const VdbWriteOptions& options,
+                                     const Progress& progress) {
+    if (const auto* own = dynamic_cast<const SelfWritingGrid*>(grid.get())) {
+        own->report_to(progress);
+        return grid;
+    }
+    openvdb::GridBase::Ptr copy;
+    if (const auto floats = openvdb::GridBase::grid<FloatGrid>(grid))
+        copy = std::make_shared<ParallelGrid>(*floats, progress);
+    else
+        copy = std::const_pointer_cast<openvdb::GridBase>(grid->copyGrid());
+    if (copy->saveFloatAsHalf() != options.half) copy->setSaveFloatAsHalf(options.half);
+    return copy;
 }
 
 }  // namespace
@@ -111,27 +145,21 @@ void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std:
     options.check();
     openvdb::initialize();
     const std::uint32_t flags = compression_flags(options);
-    openvdb::GridCPtrVec prepared;
+    openvdb::GridCPtrVec all;
     for (std::size_t g = 0; g < grids.size(); ++g) {
-        const double from = static_cast<double>(g) / static_cast<double>(grids.size());
-        const double to = static_cast<double>(g + 1) / static_cast<double>(grids.size());
-        openvdb::GridBase::Ptr grid;
-        if (dynamic_cast<const SelfWritingGrid*>(grids[g].get()))
-            grid = std::const_pointer_cast<openvdb::GridBase>(grids[g]);
-        else if (const auto floats = openvdb::GridBase::grid<FloatGrid>(grids[g]))
-            grid = std::make_shared<ParallelGrid>(*floats, progress.part(from, to));
-        else
-            grid = std::const_pointer_cast<openvdb::GridBase>(grids[g]->copyGrid());
-        if (grid->saveFloatAsHalf() != options.half) grid->setSaveFloatAsHalf(options.half);
-        prepared.push_back(grid);
+        const double many = static_cast<double>(grids.size());
+        all.push_back(
+            prepared(grids[g], options,
+                     progress.part(static_cast<double>(g) / many, static_cast<double>(g + 1) / many)));
     }
     AtomicFile file(path);
+    const NoDelayedLoadNotes no_notes;
     Writer writer;
     writer.setCompression(flags);
     try {
         file.stream().seekp(0);  // fails at once for a pipe
-        writer.write_to(file.stream(), prepared);
-        replace_identifier(file.stream(), prepared);
+        writer.write_to(file.stream(), all);
+        seal_vdb(file, identifier_of(all));
     } catch (const openvdb::Exception& e) {
         throw IoError(fmt::format("{}: {}", path.string(), e.what()));
     } catch (const std::ios_base::failure&) {

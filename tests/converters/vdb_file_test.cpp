@@ -16,6 +16,7 @@
 #include <fstream>
 #include <limits>
 
+#include "converters/self_writing_grid.h"
 #include "tests/support/data.h"
 #include "tests/support/maps.h"
 #include "tests/support/temp_folder.h"
@@ -96,9 +97,16 @@ std::uint32_t flags_of(Compression c) {
     return flags;
 }
 
-/// What OpenVDB's own writer makes of the grids.
+/// The metadata of a whole file: in ours, the checksum.
+openvdb::MetaMap file_metadata(const std::filesystem::path& path) {
+    openvdb::io::File file(path.string());
+    file.open(false);
+    return *file.getMetadata();
+}
+
+/// What OpenVDB's own writer makes of the grids, given the metadata of the file.
 std::string reference_bytes(const openvdb::GridCPtrVec& grids, const std::filesystem::path& path,
-                            const VdbWriteOptions& options) {
+                            const VdbWriteOptions& options, const openvdb::MetaMap& metadata) {
     openvdb::GridCPtrVec copies;
     for (const auto& grid : grids) {
         const auto copy = std::const_pointer_cast<openvdb::GridBase>(grid->copyGrid());
@@ -107,7 +115,7 @@ std::string reference_bytes(const openvdb::GridCPtrVec& grids, const std::filesy
     }
     openvdb::io::File file(path.string());
     file.setCompression(flags_of(options.compression));
-    file.write(copies);
+    file.write(copies, metadata);
     file.close();
     return read_bytes(path);
 }
@@ -159,13 +167,15 @@ TEST_P(VdbWrite, BytesAreThoseOfOpenVdbButForTheIdentifier) {
     for (const auto& grid : all_grids()) {
         write_vdb({grid}, folder / "ours.vdb", GetParam());
         const std::string ours = read_bytes(folder / "ours.vdb");
-        const std::string theirs = reference_bytes({grid}, folder / "theirs.vdb", GetParam());
+        const std::string theirs =
+            reference_bytes({grid}, folder / "theirs.vdb", GetParam(), file_metadata(folder / "ours.vdb"));
         EXPECT_EQ(ours.size(), theirs.size()) << grid->getName();
         EXPECT_TRUE(without_identifier(ours) == without_identifier(theirs)) << grid->getName();
     }
     write_vdb(all_grids(), folder / "ours.vdb", GetParam());
     EXPECT_TRUE(without_identifier(read_bytes(folder / "ours.vdb")) ==
-                without_identifier(reference_bytes(all_grids(), folder / "theirs.vdb", GetParam())));
+                without_identifier(reference_bytes(all_grids(), folder / "theirs.vdb", GetParam(),
+                                                   file_metadata(folder / "ours.vdb"))));
 }
 
 TEST_P(VdbWrite, SameBytesForAnyNumberOfThreadsAndEveryTime) {
@@ -295,6 +305,67 @@ TEST(VdbFile, FilesWrittenToAPipeAreRead) {
     EXPECT_EQ(list_vdb(folder / "a.vdb").size(), 4u);
     EXPECT_TRUE(same_tree(sphere()->tree(), read_vdb(folder / "a.vdb", "sphere")->tree()));
     EXPECT_TRUE(same_tree(band_grid()->tree(), read_vdb(folder / "a.vdb")->tree()));
+}
+
+TEST(VdbFile, AChecksumTellsDamageThatNothingElseCan) {
+    TempFolder folder;
+    VdbWriteOptions plain;
+    plain.compression = Compression::none;
+    write_vdb({noise_grid()}, folder / "a.vdb", plain);
+    const std::string good = read_bytes(folder / "a.vdb");
+    EXPECT_EQ(refusal(folder / "a.vdb"), "");
+    std::string bytes = good;
+    bytes[bytes.size() - 5] ^= 1;  // of the last voxel
+    test::write_bytes(folder / "a.vdb", bytes);
+    EXPECT_TRUE(
+        contains(refusal(folder / "a.vdb"), "a.vdb: its bytes are not those that were written (checksum "));
+    EXPECT_THROW(list_vdb(folder / "a.vdb"), InvalidInput);
+    bytes = good;
+    bytes[identifier_at] ^= 1;  // another file's entry
+    bytes[bytes.size() - 5] ^= 1;
+    test::write_bytes(folder / "a.vdb", bytes);
+    EXPECT_EQ(refusal(folder / "a.vdb"), "");
+}
+
+TEST(VdbFile, AFileThatAnotherProgramRewroteKeepsAStaleChecksumAndIsRead) {
+    TempFolder folder;
+    write_vdb({noise_grid()}, folder / "a.vdb");
+    openvdb::io::File in((folder / "a.vdb").string()), out((folder / "b.vdb").string());
+    in.open(false);
+    const auto metadata = in.getMetadata();
+    ASSERT_EQ(metadata->metaCount(), 1u);
+    EXPECT_EQ(metadata->metaValue<std::string>("vdbgeo_checksum").size(), 78u);
+    const auto grid = openvdb::GridBase::grid<FloatGrid>(in.readGrid("density"));
+    grid->tree().setValue(Coord(1, 2, 3), 77);
+    out.write({grid}, *metadata);
+    out.close();
+    EXPECT_EQ(read_vdb(folder / "b.vdb")->tree().getValue(Coord(1, 2, 3)), 77);
+}
+
+namespace {
+
+/// A grid that writes another one's leaves.
+struct Marked : FloatGrid, SelfWritingGrid {
+    explicit Marked(const FloatGrid& grid)
+        : FloatGrid(std::const_pointer_cast<openvdb::FloatTree>(grid.constTreePtr())) {
+        static_cast<openvdb::MetaMap&>(*this) = grid;
+    }
+    void writeBuffers(std::ostream& os) const override {
+        ++calls;
+        FloatGrid::writeBuffers(os);
+    }
+    mutable int calls = 0;
+};
+
+}  // namespace
+
+TEST(VdbFile, AGridThatWritesItselfIsLeftToDoSo) {
+    TempFolder folder;
+    const auto grid = std::make_shared<Marked>(*noise_grid());
+    write_vdb({grid}, folder / "a.vdb");
+    EXPECT_EQ(grid->calls, 1);
+    write_vdb({noise_grid()}, folder / "b.vdb");
+    EXPECT_TRUE(read_bytes(folder / "a.vdb") == read_bytes(folder / "b.vdb"));
 }
 
 TEST(VdbFile, ListsWithoutLoading) {

@@ -26,6 +26,10 @@ class AtomicFile::Sink : public std::streambuf {
     Sink& operator=(const Sink&) = delete;
 
     void commit();
+    bool seekable() const { return !direct_; }
+    void write_at(std::int64_t position, const char* data, std::size_t bytes);
+    void read_at(std::int64_t position, char* out, std::size_t bytes) const;
+    std::uint64_t flush();
 
  protected:
     int_type overflow(int_type c) override;
@@ -88,7 +92,7 @@ void AtomicFile::Sink::open_temporary() {
     const bool exists = ::stat(target_.c_str(), &status) == 0;
     if (exists && ::access(target_.c_str(), W_OK) != 0) fail("cannot be written", errno);
 #ifdef O_TMPFILE
-    fd_ = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+    fd_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
 #endif
     if (fd_ < 0) {  // a file system without unnamed files
         std::string pattern = (folder / ".vdbgeo.XXXXXX").string();
@@ -130,6 +134,39 @@ void AtomicFile::Sink::flush_buffer() {
     const std::size_t pending = static_cast<std::size_t>(pptr() - pbase());
     setp(buffer_.data(), buffer_.data() + buffer_.size());
     write_all(buffer_.data(), pending);
+}
+
+void AtomicFile::Sink::write_at(std::int64_t position, const char* data, std::size_t bytes) {
+    flush_buffer();
+    while (bytes > 0) {
+        const ssize_t n = ::pwrite(fd_, data, bytes, position);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) {
+            lost_ = true;
+            fail("writing failed", errno);
+        }
+        data += n;
+        bytes -= static_cast<std::size_t>(n);
+        position += n;
+    }
+}
+
+void AtomicFile::Sink::read_at(std::int64_t position, char* out, std::size_t bytes) const {
+    while (bytes > 0) {
+        const ssize_t n = ::pread(fd_, out, bytes, position);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) fail("reading back failed", n < 0 ? errno : EIO);
+        out += n;
+        bytes -= static_cast<std::size_t>(n);
+        position += n;
+    }
+}
+
+std::uint64_t AtomicFile::Sink::flush() {
+    flush_buffer();
+    struct stat status {};
+    if (::fstat(fd_, &status) != 0) fail("writing failed", errno);
+    return static_cast<std::uint64_t>(status.st_size);
 }
 
 AtomicFile::Sink::int_type AtomicFile::Sink::overflow(int_type c) {
@@ -215,6 +252,14 @@ void AtomicFile::write(std::string_view bytes) { write(bytes.data(), bytes.size(
 void AtomicFile::write(const void* data, std::size_t bytes) {
     sink_->sputn(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
 }
+bool AtomicFile::seekable() const { return sink_->seekable(); }
+void AtomicFile::write_at(std::uint64_t position, const void* data, std::size_t bytes) {
+    sink_->write_at(static_cast<std::int64_t>(position), static_cast<const char*>(data), bytes);
+}
+void AtomicFile::read_at(std::uint64_t position, void* out, std::size_t bytes) const {
+    sink_->read_at(static_cast<std::int64_t>(position), static_cast<char*>(out), bytes);
+}
+std::uint64_t AtomicFile::flush() { return sink_->flush(); }
 void AtomicFile::commit() { sink_->commit(); }
 
 void write_file(const fs::path& target, std::string_view bytes) {

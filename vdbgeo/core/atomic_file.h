@@ -1,6 +1,7 @@
 // Output files that appear whole or not at all.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <ostream>
@@ -28,6 +29,17 @@ class AtomicFile {
     std::ostream& stream();
     void write(std::string_view bytes);
     void write(const void* data, std::size_t bytes);
+
+    /// Whether what was written can be gone back to: true for regular files, false where the target is
+    /// written directly.
+    bool seekable() const;
+    /// Overwrites bytes at `position`; what is written next still goes where it would have gone. Seekable
+    /// files.
+    void write_at(std::uint64_t position, const void* data, std::size_t bytes);
+    /// Takes back bytes that were written before the last `flush`; from any thread. Seekable files.
+    void read_at(std::uint64_t position, void* out, std::size_t bytes) const;
+    /// Hands over to the system what is still held back here. Returns how long the file is.
+    std::uint64_t flush();
 
     /// Flushes to the disk and renames. Call it once, last.
     void commit();

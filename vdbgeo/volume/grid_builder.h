@@ -32,6 +32,7 @@ class GridBuilder {
     /// The strips of one slab, from the first row to the last: for a caller that sorts them itself.
     void add_slab(std::vector<SortedStrip>&& strips);
     const StripSorter& sorter() const { return sorter_; }
+    const MapTotals& totals() const { return totals_; }
 
     /// The map, with statistics over all samples handed over; once. Throws InvalidInput when sections are
     /// missing.

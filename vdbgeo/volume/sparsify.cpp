@@ -213,6 +213,8 @@ void SparsifyOptions::check() const {
     if (band && (*threshold + *band == *threshold || *threshold - *band == *threshold))
         throw InvalidInput(
             fmt::format("the band's width {} is lost in rounding beside the isovalue {}", *band, *threshold));
+    if (quantisation && quantisation_step(*quantisation) != *quantisation)
+        throw InvalidInput(fmt::format("the quantisation {} is not a power of two", *quantisation));
     if (threshold && background && *background > *threshold)
         throw InvalidInput(
             fmt::format("the background {} lies above the threshold {}: what is dropped would "
@@ -411,6 +413,19 @@ void StripSorter::decide(const Block& block, const Moments& m, SortedBlock& resu
     }
 }
 
+RoundingError StripSorter::round(SortedBlock& block) const {
+    if (block.leaf) return quantise(*block.leaf, *options_.quantisation);
+    RoundingError error;
+    if (block.tile != SortedBlock::Tile::kept) return error;
+    const float rounded = quantise(block.tile_value, *options_.quantisation);
+    error.largest = std::abs(double(rounded) - block.tile_value);
+    if (block.tile_value != 0) error.largest_relative = error.largest / std::abs(double(block.tile_value));
+    error.at = block.origin;
+    error.value = block.tile_value;
+    block.tile_value = rounded;
+    return error;
+}
+
 SortedStrip StripSorter::sort(const Strip& strip, int slab, int row) const {
     SortedStrip result;
     IntegerSums all;
@@ -442,6 +457,7 @@ SortedStrip StripSorter::sort(const Strip& strip, int slab, int row) const {
         samples.extent[order_[2]] = strip.sections;
         load(strip, column, samples);
         decide(samples, m, block);
+        if (options_.quantisation) result.rounding.join(round(block));
         if (block.leaf || block.tile != SortedBlock::Tile::none) result.blocks.push_back(std::move(block));
     }
     if (strip.integers) result.moments = all.moments(strip);
@@ -452,6 +468,7 @@ SortedStrip StripSorter::sort(const Strip& strip, int slab, int row) const {
 void MapTotals::add(const SortedStrip& strip) {
     moments_.join(strip.moments);
     border_.insert(border_.end(), strip.border.begin(), strip.border.end());
+    rounding_.join(strip.rounding);
 }
 
 float MapTotals::background(const StripSorter& sorter) {

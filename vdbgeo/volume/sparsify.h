@@ -9,6 +9,7 @@
 
 #include "vdbgeo/volume/density_map.h"
 #include "vdbgeo/volume/leaf_layout.h"
+#include "vdbgeo/volume/rounding.h"
 
 namespace vdbgeo {
 
@@ -24,6 +25,9 @@ struct SparsifyOptions {
     /// faces of the box (of about a million of their samples, where there are more), but not above the
     /// threshold (or the band's lower end).
     std::optional<float> background;
+    /// Round what is kept to multiples of this power of two (quantisation_step): the zeros at the end of the
+    /// values are what compression finds. Thresholds apply to the values before.
+    std::optional<float> quantisation;
 
     /// Throws InvalidInput when the fields contradict each other.
     void check() const;
@@ -66,6 +70,7 @@ struct SortedStrip {
     Moments moments;
     std::vector<SortedBlock> blocks;
     std::vector<float> border;  ///< samples on the faces of the box
+    RoundingError rounding;     ///< of the quantisation
 };
 
 /// Sorts strips into blocks. `sort` may be called from many threads; what it gives depends on the strip alone.
@@ -102,6 +107,7 @@ class StripSorter {
     void load(const Strip& strip, int column, Block& block) const;
     void decide(const Block& block, const Moments& moments, SortedBlock& result) const;
     bool mark_kept(const Block& block, SortedBlock& result) const;
+    RoundingError round(SortedBlock& block) const;
 
     Vec3i size_;
     std::array<int, 3> order_;
@@ -117,10 +123,12 @@ class MapTotals {
     Statistics statistics() const { return moments_.statistics(); }
     /// The value of what was dropped, as SparsifyOptions::background tells. Call it once, last.
     float background(const StripSorter& sorter);
+    const RoundingError& rounding() const { return rounding_; }
 
  private:
     Moments moments_;
     std::vector<float> border_;
+    RoundingError rounding_;
 };
 
 }  // namespace vdbgeo

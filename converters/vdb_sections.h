@@ -1,0 +1,50 @@
+// A grid in a VDB file → dense sections, while its voxels stay in the file.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "converters/dense_sections.h"
+#include "converters/mrc.h"
+#include "vdbgeo/core/progress.h"
+
+namespace vdbgeo {
+
+/// Opens a grid of floats in a VDB file and notes where its leaves lie; their voxels are decoded when they
+/// are asked for, by OpenVDB's own leaf. Checked as by read_vdb, errors as there. Memory: 4 bytes a leaf, 550
+/// a node of 128³ voxels (twenty thousandths of the voxels' bytes), and what read_vdb would need for tiles.
+class VdbSections {
+ public:
+    /// `grid` unset: "density", else the first grid of floats.
+    explicit VdbSections(const std::filesystem::path& path, const std::optional<std::string>& grid = {});
+    ~VdbSections();
+    VdbSections(VdbSections&&) noexcept;
+
+    /// The grid without its leaves: name, metadata, transform, background and tiles.
+    const openvdb::FloatGrid& grid() const;
+    /// Where it lies; bounded where the metadata tell the box.
+    const Frame& frame() const;
+    std::uint64_t active_voxels() const;
+    std::uint64_t leaves() const;
+    const openvdb::CoordBBox& active_box() const;
+    /// Bytes that the notes take.
+    std::uint64_t memory() const;
+
+    /// Sections of this grid, which must live as long. Leaves are read with pread and decoded on all threads,
+    /// each once for every slab of eight sections that it lies in, so once.
+    DenseSections sections(const Vec3i& first, const Vec3i& size, const std::array<int, 3>& order) const;
+
+ private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// Writes the grid as write_mrc does, to the same bytes, with eight sections in memory.
+MrcWriteReport write_mrc(const VdbSections& grid, const std::filesystem::path& path,
+                         const MrcWriteOptions& options = {}, const Progress& progress = {});
+
+}  // namespace vdbgeo

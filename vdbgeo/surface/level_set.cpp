@@ -1,25 +1,32 @@
 #include "vdbgeo/surface/level_set.h"
 
 #include <fmt/format.h>
+#include <openvdb/math/Proximity.h>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Interpolation.h>
-#include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tree/LeafManager.h>
 #include <openvdb/tree/NodeManager.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/surface/marching_cubes.h"
 #include "vdbgeo/volume/derived_grid.h"
-#include "vdbgeo/volume/interrupter.h"
 
 namespace vdbgeo {
 namespace {
 
+using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
@@ -82,45 +89,140 @@ Target target_of(const DensityMap& map) {
     return target;
 }
 
-/// Triangles in the indices of the map, shown to OpenVDB in those of the level set.
-class Triangles {
+/// The triangles in the indices of the level set, found by the unit cell that holds their middle.
+class TriangleCells {
  public:
-    Triangles(const TriMesh& mesh, const Target& target) : mesh_(mesh), target_(target) {}
-    std::size_t polygonCount() const { return mesh_.triangles.size(); }
-    std::size_t pointCount() const { return mesh_.points.size(); }
-    std::size_t vertexCount(std::size_t) const { return 3; }
-    void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& out) const {
-        Vec3d p = mesh_.points[mesh_.triangles[n][v]].cast<double>();
-        if (!target_.same) p = target_.from_map * p;
-        out = openvdb::Vec3d(p.x(), p.y(), p.z());
+    TriangleCells(const TriMesh& mesh, const Target& target) : mesh_(mesh), target_(target), heads_(none) {
+        next_.resize(mesh.triangles.size());
+        openvdb::tree::ValueAccessor<openvdb::Int64Tree> heads(heads_);
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            const auto corners = triangle(t);
+            const openvdb::Vec3d middle = (corners[0] + corners[1] + corners[2]) / 3;
+            const Coord cell = Coord::floor(middle);
+            for (const auto& p : corners)
+                for (int a = 0; a < 3; ++a) reach_ = std::max({reach_, cell[a] - p[a], p[a] - cell[a] - 1});
+            next_[t] = heads.getValue(cell);
+            heads.setValue(cell, static_cast<std::int64_t>(t));
+        }
+    }
+
+    static constexpr std::int64_t none = -1;
+    const openvdb::Int64Tree& heads() const { return heads_; }
+    /// How far a triangle sticks out of its cell, at most; 0 where cells are those of marching cubes.
+    double reach() const { return reach_; }
+
+    /// The least of `best` and the squared distances from p to the triangles of the list that begins at `t`.
+    double nearest(std::int64_t t, const openvdb::Vec3d& p, double best) const {
+        for (; t != none; t = next_[static_cast<std::size_t>(t)]) {
+            const auto c = triangle(static_cast<std::size_t>(t));
+            openvdb::Vec3d weights;
+            const auto at = openvdb::math::closestPointOnTriangleToPoint(c[0], c[1], c[2], p, weights);
+            best = std::min(best, (at - p).lengthSqr());
+        }
+        return best;
     }
 
  private:
+    std::array<openvdb::Vec3d, 3> triangle(std::size_t t) const {
+        std::array<openvdb::Vec3d, 3> corners;
+        for (std::size_t c = 0; c < 3; ++c) {
+            Vec3d p = mesh_.points[mesh_.triangles[t][c]].cast<double>();
+            if (!target_.same) p = target_.from_map * p;
+            corners[c] = openvdb::Vec3d(p.x(), p.y(), p.z());
+        }
+        return corners;
+    }
+
     const TriMesh& mesh_;
     const Target& target_;
+    openvdb::Int64Tree heads_;
+    Array<std::int64_t> next_;
+    double reach_ = 0;
 };
 
-/// Gives distances the sign of the field, and takes what does not belong into the band out of it.
-void set_signs(FloatTree& tree, const Field& field, const Target& target, float width) {
-    const Eigen::Affine3d to_map = target.from_map.inverse();
-    const float level = static_cast<float>(field.level);
-    openvdb::tree::LeafManager<FloatTree> leaves(tree);
-    leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
-        openvdb::FloatGrid::ConstAccessor samples(*field.tree);
-        for (auto it = leaf.beginValueOn(); it; ++it) {
-            const openvdb::Coord ijk = it.getCoord();
-            float density;
-            if (target.same) {
-                density = samples.getValue(ijk);
-            } else {
-                const Vec3d p = to_map * Vec3d(ijk.x(), ijk.y(), ijk.z());
-                density = openvdb::tools::BoxSampler::sample(samples, openvdb::Vec3d(p.x(), p.y(), p.z()));
+/// Cells around a voxel, nearest first: no triangle of a cell is nearer than `bound` (squared).
+struct CellOffset {
+    Coord offset;
+    double bound = 0;
+};
+
+std::vector<CellOffset> cells_around(double radius, double reach) {
+    std::vector<CellOffset> cells;
+    const int far = static_cast<int>(std::ceil(radius + reach)) + 1;
+    for (int x = -far; x <= far; ++x)
+        for (int y = -far; y <= far; ++y)
+            for (int z = -far; z <= far; ++z) {
+                double bound = 0;
+                for (const int o : {x, y, z}) {
+                    const double gap = std::max({0.0, o - reach, -1.0 - o - reach});
+                    bound += gap * gap;
+                }
+                if (bound < radius * radius) cells.push_back({Coord(x, y, z), bound});
             }
-            const float distance = std::min(*it, width);
-            it.setValue(density >= level ? -distance : distance);
-            if (distance >= width) it.setValueOff();
+    std::stable_sort(cells.begin(), cells.end(),
+                     [](const CellOffset& a, const CellOffset& b) { return a.bound < b.bound; });
+    return cells;
+}
+
+/// Whether the field is dense at voxels of the level set.
+class Side {
+ public:
+    Side(const Field& field, const Target& target)
+        : samples_(*field.tree),
+          level_(static_cast<float>(field.level)),
+          same_(target.same),
+          to_map_(target.from_map.inverse()) {}
+
+    bool is_dense(const Coord& ijk) const {
+        if (same_) return samples_.getValue(ijk) >= level_;
+        const Vec3d p = to_map_ * Vec3d(ijk.x(), ijk.y(), ijk.z());
+        return openvdb::tools::BoxSampler::sample(samples_, openvdb::Vec3d(p.x(), p.y(), p.z())) >= level_;
+    }
+
+ private:
+    FloatGrid::ConstAccessor samples_;
+    float level_;
+    bool same_;
+    Eigen::Affine3d to_map_;
+};
+
+/// The band of voxels nearer than `half` voxels to a triangle, with signed distances; all else is ±width.
+/// Each voxel looks through the cells around it, the nearest first, until no cell can hold a nearer triangle:
+/// exact, and about a hundred cells of which few are not empty.
+FloatTree::Ptr signed_band(const TriangleCells& triangles, const Field& field, const Target& target,
+                           double half, float width, const Progress& progress) {
+    openvdb::MaskTree near(triangles.heads(), false, true, openvdb::TopologyCopy());
+    openvdb::tools::dilateActiveValues(near, static_cast<int>(std::ceil(half + triangles.reach())) + 1,
+                                       openvdb::tools::NN_FACE_EDGE_VERTEX);
+    const auto tree = std::make_shared<FloatTree>(near, width, openvdb::TopologyCopy());
+    tree->voxelizeActiveTiles();
+    near.clear();
+    const auto around = cells_around(half, triangles.reach());
+    const double voxel = width / half;
+    openvdb::tree::LeafManager<FloatTree> leaves(*tree);
+    std::atomic<std::size_t> done{0};
+    parallel_for(leaves.leafCount(), 8, [&](std::size_t n) {
+        const Side side(field, target);
+        openvdb::tree::ValueAccessor<const openvdb::Int64Tree> heads(triangles.heads());
+        for (auto it = leaves.leaf(n).beginValueOn(); it; ++it) {
+            const Coord ijk = it.getCoord();
+            const openvdb::Vec3d p = ijk.asVec3d();
+            double best = half * half;
+            for (const CellOffset& cell : around) {
+                if (cell.bound >= best) break;
+                const std::int64_t first = heads.getValue(ijk + cell.offset);
+                if (first != TriangleCells::none) best = triangles.nearest(first, p, best);
+            }
+            const bool in_band = best < half * half;
+            const float distance = std::min(width, static_cast<float>(std::sqrt(best) * voxel));
+            it.setValue(side.is_dense(ijk) ? -distance : distance);
+            if (!in_band || distance >= width) it.setValueOff();
         }
+        const std::size_t now = ++done;
+        if (now % 64 == 0)
+            progress.report(static_cast<double>(now) / static_cast<double>(leaves.leafCount()));
     });
+    return tree;
 }
 
 /// half · voxel as a float that is not below it: OpenVDB's check of level sets divides again.
@@ -154,16 +256,13 @@ FloatGrid::Ptr level_set(const DensityMap& map, double isovalue, const LevelSetO
                         isovalue, map.statistics.min, map.statistics.max));
 
     const auto transform = transform_of(target.frame);
-    Interrupter interrupter(progress.part(0.3, 0.9));
-    const auto grid = openvdb::tools::meshToVolume<FloatGrid>(
-        interrupter, Triangles(mesh, target), *transform, static_cast<float>(options.half_width),
-        static_cast<float>(options.half_width), openvdb::tools::UNSIGNED_DISTANCE_FIELD);
-    interrupter.check();
     const float width = band_width(options.half_width, transform->voxelSize()[0]);
-    openvdb::tools::changeBackground(grid->tree(), width);
-    set_signs(grid->tree(), field, target, width);
-    openvdb::tools::signedFloodFill(grid->tree());
-    openvdb::tools::pruneLevelSet(grid->tree());
+    const auto tree = signed_band(TriangleCells(mesh, target), field, target, options.half_width, width,
+                                  progress.part(0.4, 0.95));
+    openvdb::tools::pruneInactive(*tree);  // the flood goes from active voxel to active voxel
+    openvdb::tools::signedFloodFill(*tree);
+    openvdb::tools::pruneLevelSet(*tree);
+    const auto grid = FloatGrid::create(tree);
     progress.report(1);
 
     const std::string line =

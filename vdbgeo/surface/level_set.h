@@ -17,7 +17,8 @@ struct LevelSetOptions {
 /// inside, where the density is at or above the isovalue; voxels with |φ| < half_width · voxel are active,
 /// all others are ±half_width · voxel by their side, tiles and cavities too.
 ///
-/// |φ| is the distance to the triangles that marching_cubes gives (by tools::meshToVolume), the sign that of
+/// |φ| is the distance to the triangles that marching_cubes gives, exactly (OpenVDB's
+/// meshToVolume errs by a sixth of a voxel at the band's edge); the sign that of
 /// the density itself. What lies outside the box of the map is empty, so that a surface that meets the border
 /// is closed there, half a voxel outside or so. Against a true distance the error is that of the triangles,
 /// second order in the voxel.
@@ -27,8 +28,8 @@ struct LevelSetOptions {
 /// map's smallest, and the sign is that of the trilinear density. A level set (negative inside) is taken too,
 /// at any isovalue.
 ///
-/// Cost: that of marching_cubes, and some µs a triangle. Throws InvalidInput for an isovalue that is not
-/// finite, NumericalError where nothing crosses it; Cancelled.
+/// Cost: that of marching_cubes, some µs a voxel of the band, and 16 bytes a triangle. Throws InvalidInput
+/// for an isovalue that is not finite, NumericalError where nothing crosses it; Cancelled.
 openvdb::FloatGrid::Ptr level_set(const DensityMap& map, double isovalue, const LevelSetOptions& options = {},
                                   const Progress& progress = {});
 

@@ -41,7 +41,9 @@ Statistics statistics_of_active(const openvdb::FloatGrid& grid) {
     return s;
 }
 
-Frame frame_of_transform(const openvdb::math::Transform& transform) {
+}  // namespace
+
+Frame frame_of(const openvdb::math::Transform& transform) {
     if (!transform.isLinear()) throw InvalidInput("the grid's transform is not linear (a frustum, say)");
     Frame frame;
     const auto origin = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
@@ -80,8 +82,6 @@ openvdb::math::Transform::Ptr transform_of(const Frame& frame) {
     return transform;
 }
 
-}  // namespace
-
 void store_frame(DensityMap& map) {
     if (!map.frame.axes.allFinite() || !map.frame.origin.allFinite())
         throw InvalidInput("the map's frame is not finite");
@@ -108,7 +108,7 @@ void store_frame(DensityMap& map) {
 DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid) {
     DensityMap map;
     map.grid = grid;
-    map.frame = frame_of_transform(grid->transform());
+    map.frame = frame_of(grid->transform());
     const auto number = [&](const char* name) { return grid->getMetadata<openvdb::DoubleMetadata>(name); };
     if (const auto size = grid->getMetadata<openvdb::Vec3IMetadata>(size_key)) {
         const Vec3i box(size->value().x(), size->value().y(), size->value().z());

@@ -47,6 +47,14 @@ struct DensityMap {
     Statistics statistics;
 };
 
+/// The frame of a linear transform, unbounded; InvalidInput where the transform is not linear (a frustum) or
+/// singular.
+Frame frame_of(const openvdb::math::Transform& transform);
+
+/// The transform of a frame: the simplest kind of map that holds it to the last bit (uniform scale, scale,
+/// affine).
+openvdb::math::Transform::Ptr transform_of(const Frame& frame);
+
 /// Writes the frame and the statistics into the grid's transform and metadata, so that they survive a VDB
 /// file, to the last bit. Throws InvalidInput for a frame that is not finite, and for voxels of 3e-15 Å³ or
 /// less, flat ones among them.

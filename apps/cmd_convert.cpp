@@ -29,36 +29,74 @@ void convert_mesh(const ConvertOptions& o, Session& session) {
         {{"in", o.in}, {"out", o.out}, {"vertices", mesh.points.size()}, {"faces", mesh.triangles.size()}});
 }
 
-void convert_map(const ConvertOptions& o, Session& session) {
+/// What rounding cost, where values were rounded.
+void report_rounding(const ConvertOptions& o, const MapFile& in, Json& j, Session& session) {
+    const auto tell = [&](const char* what, const RoundingError& e) {
+        if (!session.json && !session.quiet)
+            session.say(fmt::format("{}: {}: largest error {:.3g}, relative {:.3g}", o.out, what, e.largest,
+                                    e.largest_relative));
+        return Json{{"largest_error", e.largest}, {"largest_relative_error", e.largest_relative},
+                    {"at", {e.at.x(), e.at.y(), e.at.z()}}};
+    };
+    if (in.quantisation) {
+        j["quantisation"] = tell(fmt::format("rounded to multiples of {}", *in.quantisation).c_str(), in.rounding);
+        j["quantisation"]["step"] = *in.quantisation;
+    }
+    if (o.vdb.half) j["half"] = tell("stored as 16-bit floats", in.half_error);
+}
+
+/// To a VDB file: map files within the memory allowed, grids as they are.
+void convert_to_grid(const ConvertOptions& o, const MapReadOptions& options, Session& session) {
     Json seconds;
     Clock clock;
-    MapReadOptions options = o.map.options;
-    const std::filesystem::path folder = std::filesystem::path(o.out).parent_path();
-    options.scratch = o.out == "-" ? "" : folder.empty() ? "." : folder;
     const auto progress = session.stage("reading");
-    const bool stream = is_vdb_ending(o.out) && !is_vdb_file(o.in);
-    const MapFile in = stream ? stream_map(o.in, options, o.vdb, progress) : read_map(o.in, options, progress);
+    MapFile in = is_vdb_file(o.in) ? read_map(o.in, options, progress) : stream_map(o.in, options, o.vdb, progress);
+    if (is_vdb_file(o.in) && o.vdb.half) in.half_error = naming(o.in, [&] {
+        const RoundingError error = half_rounding_error(*in.map.grid);
+        check_half_range(error);
+        return error;
+    });
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
-    if (!session.quiet)
-        for (const std::string& note : in.notes) session.say(o.in + ": " + note);
     if (in.map.grid->activeVoxelCount() == 0)
         throw NumericalError(fmt::format(
             "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold", o.in,
             in.map.statistics.min, in.map.statistics.max));
-    const auto written = write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
+    write_vdb({in.map.grid}, o.out, o.vdb, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();
     Json j{{"in", o.in}, {"out", o.out}};
     j.update(grid_json(in.map));
     j["warnings"] = in.warnings;
     j["notes"] = in.notes;
-    j["seconds"] = seconds;
-    if (!session.json && !session.quiet)
+    if (!session.json && !session.quiet) {
+        for (const std::string& note : in.notes) session.say(o.in + ": " + note);
         session.say(
             fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB",
                         o.out, j["active_voxels"].dump(), j["bytes_in_memory"].get<double>() / 1e6,
                         j["dense_bytes"].get<double>() / 1e6));
+    }
+    report_rounding(o, in, j, session);
+    j["seconds"] = seconds;
+    session.result(j);
+}
+
+/// A grid to a map file, where something is asked for that it would have to be loaded for, or warned of.
+void convert_loaded_grid(const ConvertOptions& o, const MapReadOptions& options, Session& session) {
+    Json seconds;
+    Clock clock;
+    const MapFile in = read_map(o.in, options, session.stage("reading"));
+    seconds["read"] = clock.lap();
+    for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
+    if (in.map.grid->activeVoxelCount() == 0)
+        throw NumericalError(fmt::format("{}: no sample is kept: the grid has no active voxel", o.in));
+    const auto written = write_map(in.map, o.out, o.vdb, o.mrc, session.stage("writing"));
+    seconds["write"] = clock.lap();
+    session.end_stage();
+    Json j{{"in", o.in}, {"out", o.out}};
+    j.update(grid_json(in.map));
+    j["warnings"] = in.warnings;
+    j["seconds"] = seconds;
     if (written) report_written(o.out, *written, j, session);
     session.result(j);
 }
@@ -75,9 +113,13 @@ void run_convert(const ConvertOptions& o, Session& session) {
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
     check_map_output(o.out, session);
-    if (!is_vdb_ending(o.out) && taken_as_it_is(o.map.options) && is_vdb_file(o.in))
-        return convert_grid_to_map(o.in, o.out, o.map.options.grid, o.mrc, session);
-    convert_map(o, session);
+    MapReadOptions options = o.map.options;
+    const std::filesystem::path folder = std::filesystem::path(o.out).parent_path();
+    if (o.out != "-") options.scratch = folder.empty() ? "." : folder;  // there is room for the output there
+    if (is_vdb_ending(o.out)) return convert_to_grid(o, options, session);
+    if (!is_vdb_file(o.in)) return convert_map_to_map(o.in, o.out, options, o.mrc, session);
+    if (taken_as_it_is(options)) return convert_grid_to_map(o.in, o.out, options.grid, o.mrc, session);
+    convert_loaded_grid(o, options, session);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "apps/reports.h"
+#include "converters/map_copy.h"
 #include "converters/vdb_sections.h"
 #include "vdbgeo/core/errors.h"
 
@@ -98,6 +99,34 @@ void convert_grid_to_map(const std::string& in, const std::string& out,
         session.say(fmt::format("{}: {} active voxels, {:.1f} MB of samples", out, source.active_voxels(),
                                 j["dense_bytes"].get<double>() / 1e6));
     report_written(out, report, j, session);
+    session.result(j);
+}
+
+void convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
+                        const MrcWriteOptions& write, Session& session) {
+    Clock clock;
+    const MapCopy copy = copy_map(in, out, read, write, session.stage("converting"));
+    const double seconds = clock.lap();
+    session.end_stage();
+    for (const std::string& w : copy.warnings) session.warn(in + ": " + w);
+    const Statistics& s = copy.report.statistics;
+    Json j{{"in", in}, {"out", out}};
+    j["size"] = {copy.frame.size.x(), copy.frame.size.y(), copy.frame.size.z()};
+    j["voxel_size_A"] = to_json(copy.frame.voxel_size());
+    j["origin_A"] = to_json(copy.frame.origin);
+    j["min"] = s.min;
+    j["max"] = s.max;
+    j["mean"] = s.mean;
+    j["rms"] = s.rms;
+    j["warnings"] = copy.warnings;
+    j["notes"] = copy.notes;
+    j["seconds"] = {{"convert", seconds}};
+    if (!session.json && !session.quiet) {
+        for (const std::string& note : copy.notes) session.say(in + ": " + note);
+        session.say(fmt::format("{}: {} x {} x {} samples, {:.6g} to {:.6g}", out, copy.frame.size.x(),
+                                copy.frame.size.y(), copy.frame.size.z(), s.min, s.max));
+    }
+    report_written(out, copy.report, j, session);
     session.result(j);
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "apps/session.h"
+#include "converters/map_options.h"
 #include "converters/mrc.h"
 
 namespace vdbgeo::app {
@@ -23,5 +24,9 @@ void report_written(const std::string& path, const MrcWriteReport& report, Json&
 void convert_grid_to_map(const std::string& in, const std::string& out,
                          const std::optional<std::string>& grid, const MrcWriteOptions& options,
                          Session& session);
+
+/// Writes a map file as another one, a few sections at a time.
+void convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
+                        const MrcWriteOptions& write, Session& session);
 
 }  // namespace vdbgeo::app

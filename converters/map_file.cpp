@@ -15,28 +15,17 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What read_map and stream_map do alike once the samples are sorted.
-MapFile finish(const fs::path& path, MapPasses& passes, const MapReadOptions& options, DensityMap&& map) {
+MapFile finish(MapPasses& passes, DensityMap&& map) {
     MapFile result;
     result.map = std::move(map);
     result.warnings = passes.source().warnings();
     if (result.map.statistics.non_finite > 0)
         result.warnings.push_back(fmt::format("{} samples are not finite numbers; they count as empty",
                                               result.map.statistics.non_finite));
-    openvdb::MetaMap& meta = *result.map.grid;
-    store_mrc_metadata(meta, passes.source().reader(), path.filename().string());
-    if (options.bin > 1 || options.normalise != MapReadOptions::Normalise::none || options.quantise) {
-        meta.removeMeta("mrc_mode");  // whole numbers no longer
-        meta.insertMeta("mrc_mode", openvdb::Int32Metadata(2));
-    }
+    passes.store_metadata(*result.map.grid);
     add_history(*result.map.grid, passes.history());
     result.quantisation = passes.sparsify().quantisation;
-    if (passes.source().unpacked() > 0)
-        result.notes.push_back(fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
-                                           static_cast<double>(passes.source().unpacked()) / 1e6,
-                                           passes.passes() > 1 ? fmt::format("{} times", passes.passes()) : "in parts"));
-    if (options.despeckle > 1)
-        result.notes.push_back(fmt::format("{} voxels were in pieces of fewer than {}, and dropped",
-                                           passes.despeckled(), options.despeckle));
+    result.notes = passes.notes();
     return result;
 }
 
@@ -55,7 +44,7 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
                 },
                 progress.part(before, 1));
     DensityMap map = builder.finish(passes.source().frame());
-    MapFile result = finish(path, passes, options, std::move(map));
+    MapFile result = finish(passes, std::move(map));
     result.rounding = builder.totals().rounding();
     return result;
 }
@@ -143,7 +132,7 @@ MapFile stream_map(const fs::path& path, const MapReadOptions& options, const Vd
     map.frame = passes.source().frame();
     map.statistics = totals.statistics();
     store_frame(map);
-    MapFile result = finish(path, passes, options, std::move(map));
+    MapFile result = finish(passes, std::move(map));
     result.rounding = totals.rounding();
     result.half_error = leaves->half_error();
     if (leaves->spilled() > 0)

@@ -29,17 +29,6 @@ bool wants_percentile(const MapReadOptions& o) {
                            o.threshold->kind == ThresholdRule::Kind::fraction);
 }
 
-/// The samples of a strip's row as floats.
-const float* row_of(const Strip& strip, int section, int row, Array<float>& space) {
-    const std::size_t at = static_cast<std::size_t>(section) * strip.section_stride +
-                           static_cast<std::size_t>(row) * strip.row_stride;
-    if (strip.floats) return strip.floats + at;
-    space.resize(static_cast<std::size_t>(strip.columns));
-    for (std::size_t i = 0; i < space.size(); ++i)
-        space[i] = static_cast<float>(strip.sign * (strip.integers[at + i] + strip.bias));
-    return space.data();
-}
-
 /// Puts the active voxels of a sorted map into a mask.
 void add_voxels(const std::vector<SortedStrip>& strips, MaskTree& mask) {
     for (const SortedStrip& strip : strips)
@@ -58,15 +47,35 @@ int MapPasses::passes_before(const MapReadOptions& o) {
            (o.needs_selection() && (o.threshold || o.sparsify.threshold) ? 1 : 0);
 }
 
-MapPasses::MapPasses(const std::filesystem::path& path, const MapReadOptions& options)
+MapPasses::MapPasses(const std::filesystem::path& path, const MapReadOptions& options, int last)
     : name_(path == "-" ? "standard input" : path.string()),
       file_(path.filename().string()),
       options_(options),
+      last_(last),
       sparsify_(options.sparsify),
-      source_(path, options, passes_before(options) + 1),
+      source_(path, options, passes_before(options) + last),
       size_(source_.frame().size) {}
 
-int MapPasses::passes() const { return passes_before(options_) + 1; }
+int MapPasses::passes() const { return passes_before(options_) + last_; }
+
+void MapPasses::store_metadata(openvdb::MetaMap& meta) const {
+    store_mrc_metadata(meta, source_.reader(), file_);
+    if (options_.bin == 1 && options_.normalise == MapReadOptions::Normalise::none && !options_.quantise) return;
+    meta.removeMeta("mrc_mode");  // whole numbers no longer
+    meta.insertMeta("mrc_mode", openvdb::Int32Metadata(2));
+}
+
+std::vector<std::string> MapPasses::notes() const {
+    std::vector<std::string> all;
+    if (source_.unpacked() > 0)
+        all.push_back(fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
+                                  static_cast<double>(source_.unpacked()) / 1e6,
+                                  passes() > 1 ? fmt::format("{} times", passes()) : "in parts"));
+    if (options_.despeckle > 1)
+        all.push_back(fmt::format("{} voxels were in pieces of fewer than {}, and dropped", despeckled_,
+                                  options_.despeckle));
+    return all;
+}
 
 /// Strips that are packed at a time.
 int MapPasses::group() const {
@@ -87,10 +96,13 @@ void MapPasses::find_percentile(const Progress& progress) {
     for (int pass = 0; pass < OrderStatistic::passes && !order.done(); ++pass) {
         source_.pass(
             [&](const Strip& strip, int, int, std::size_t) {
-                Array<float> space;
-                for (int s = 0; s < strip.sections; ++s)
+                const std::size_t n = static_cast<std::size_t>(strip.columns);
+                Array<float> values(leaf::dim * n);
+                for (int s = 0; s < strip.sections; ++s) {
                     for (int r = 0; r < strip.rows; ++r)
-                        order.add(row_of(strip, s, r, space), static_cast<std::size_t>(strip.columns));
+                        strip.copy_row(s, r, values.data() + static_cast<std::size_t>(r) * n);
+                    order.add(values.data(), static_cast<std::size_t>(strip.rows) * n);
+                }
             },
             [](std::size_t) {}, [] {}, progress.part(0.5 * pass, 0.5 * (pass + 1)));
         order.end_pass();

@@ -13,7 +13,8 @@ namespace vdbgeo {
 class MapPasses {
  public:
     /// Errors as StripSource. `path` may be a pipe: see StripSource.
-    MapPasses(const std::filesystem::path& path, const MapReadOptions& options);
+    /// `last`: how often the samples are wanted after prepare().
+    MapPasses(const std::filesystem::path& path, const MapReadOptions& options, int last = 1);
 
     /// Statistics, percentile and selection, as far as they are wanted.
     void prepare(const Progress& progress = {});
@@ -35,6 +36,10 @@ class MapPasses {
     std::string history() const;
     std::uint64_t despeckled() const { return despeckled_; }
     int passes() const;
+    /// What a grid has to remember of the file, as store_mrc_metadata; mode 2 once values became others.
+    void store_metadata(openvdb::MetaMap& meta) const;
+    /// What was done that the user may want to know, one line each.
+    std::vector<std::string> notes() const;
 
  private:
     static int passes_before(const MapReadOptions& options);
@@ -48,6 +53,7 @@ class MapPasses {
 
     std::string name_, file_;
     MapReadOptions options_;
+    int last_;
     SparsifyOptions sparsify_;
     StripSource source_;
     Vec3i size_;

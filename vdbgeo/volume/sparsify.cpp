@@ -222,6 +222,16 @@ void SparsifyOptions::check() const {
                         *background, *threshold));
 }
 
+void Strip::copy_row(int section, int row, float* out) const {
+    const std::size_t at = static_cast<std::size_t>(section) * section_stride + static_cast<std::size_t>(row) * row_stride,
+                      n = static_cast<std::size_t>(columns);
+    if (floats) {
+        std::memcpy(out, floats + at, n * sizeof(float));
+        return;
+    }
+    for (std::size_t i = 0; i < n; ++i) out[i] = value_of(*this, integers[at + i]);
+}
+
 void Moments::join(const Moments& other) {
     non_finite += other.non_finite;
     if (other.count == 0) return;

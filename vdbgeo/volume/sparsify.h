@@ -41,6 +41,9 @@ struct Strip {
     int bias = 0, sign = 1;
     std::size_t row_stride = 0, section_stride = 0;  ///< in samples
     int columns = 0, rows = 0, sections = 0;
+
+    /// One row as floats.
+    void copy_row(int section, int row, float* out) const;
 };
 
 /// Count, mean and squared deviations of a set of samples; sets join by Chan, Golub and LeVeque's update

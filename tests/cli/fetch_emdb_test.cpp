@@ -29,6 +29,11 @@ const std::string xml_old = R"(<?xml version="1.0" encoding="UTF-8"?>
 
 class FetchEmdb : public Cli {
  protected:
+    void SetUp() override {
+        if (run({"/bin/sh", "-c", "command -v curl python3"}).code != 0)
+            GTEST_SKIP() << "NOT TESTED: curl or python3 is not installed";
+    }
+
     /// A file of the archive in the folder `root`, by its path there.
     void put(const std::string& path, const std::string& content) const {
         fs::create_directories((folder_ / path).parent_path());

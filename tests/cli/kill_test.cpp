@@ -15,7 +15,7 @@ class Kill : public Cli {
  protected:
     void SetUp() override {
         fs::create_directory(folder_ / "out");
-        const std::string map = phantom("noise.mrc", sanitized ? 64 : 200, {"--snr", "1"});
+        const std::string map = phantom("noise.mrc", sanitized ? 64 : 144, {"--snr", "1"});
         good({"convert", map, at("grid.vdb"), "--compression", "none", "--quiet"});
         // A killed process can only vanish without a trace where files without a name exist.
         const int nameless = ::open((folder_ / "out").c_str(), O_TMPFILE | O_WRONLY, 0600);
@@ -26,29 +26,26 @@ class Kill : public Cli {
     Words to_grid() const { return {"convert", at("noise.mrc"), at("out/new.vdb"), "--compression", "zip"}; }
     Words to_map() const { return {"convert", at("grid.vdb"), at("out/new.mrc")}; }
 
-    /// Moments from `begin` (when the program listens) to just after the end of an undisturbed run.
-    std::vector<std::chrono::milliseconds> moments(double begin, unsigned seed) const {
+    /// One moment in each tenth of an undisturbed run, and a little after its end.
+    std::vector<std::chrono::milliseconds> moments(unsigned seed) const {
         std::mt19937 random(seed);
         std::vector<std::chrono::milliseconds> times;
-        const double end = std::max(1.05 * whole_seconds_, begin + 0.05);
-        for (int i = 0; i < 10; ++i) {
-            // One in each tenth of the time.
-            const double part = (i + random() * 0x1p-32) / 10;
-            times.emplace_back(static_cast<int>(1000 * (begin + part * (end - begin))));
-        }
+        for (int i = 0; i < 10; ++i)
+            times.emplace_back(static_cast<int>(1050 * whole_seconds_ * (i + random() * 0x1p-32) / 10));
         return times;
     }
 
     /// An undisturbed run: its bytes, and the time it takes.
     void run_whole(const Words& words) {
         name_ = fs::path(words[2]).filename();
+        good(words);  // the first run waits for the disk
         whole_seconds_ = good(words).seconds;
         whole_ = bytes("out/" + name_);
         fs::remove(words[2]);
         ASSERT_FALSE(whole_.empty());
     }
 
-    /// Nothing, or the whole file; with a name given to the temporary file only where it cannot do without.
+    /// No file at all in the folder, or where it may be there the whole one.
     void expect_nothing_or_all(bool may_be_there) {
         for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
             const std::string found = entry.path().filename();
@@ -65,7 +62,7 @@ class Kill : public Cli {
     void kill(const Words& words) {
         run_whole(words);
         int killed = 0;
-        for (const auto moment : moments(0, 1)) {
+        for (const auto moment : moments(1)) {
             SCOPED_TRACE(testing::Message() << words[2] << " killed after " << moment.count() << " ms");
             RunOptions options;
             options.signal_after = moment;
@@ -75,25 +72,28 @@ class Kill : public Cli {
             if (nameless_ || !r.killed) expect_nothing_or_all(true);
             fs::remove(words[2]);
         }
-        EXPECT_GT(killed, 2);
+        EXPECT_GT(killed, 0);
     }
 
-    void interrupt(const Words& words, int signal) {
+    /// SIGINT and SIGTERM in turns.
+    void interrupt(const Words& words) {
         run_whole(words);
         std::vector<double> answers;
-        for (const auto moment : moments(sanitized ? 0.5 : 0.1, static_cast<unsigned>(signal))) {
+        RunOptions options;
+        options.signal_heard = true;
+        options.signal = SIGTERM;
+        for (const auto moment : moments(2)) {
             SCOPED_TRACE(testing::Message() << words[2] << " signalled after " << moment.count() << " ms");
-            RunOptions options;
-            options.signal = signal;
+            options.signal = options.signal == SIGINT ? SIGTERM : SIGINT;
             options.signal_after = moment;
             const Ended r = vdbgeo(words, options);
-            EXPECT_FALSE(r.killed) << *r.killed;
-            EXPECT_TRUE(r.code == 130 || r.code == 0) << r.code.value_or(-1) << r.err;
+            EXPECT_TRUE(r.code == 130 || r.code == 0) << r.err;
             expect_nothing_or_all(r.code == 0);
             if (r.code != 130) continue;
             EXPECT_NE(r.err.find("vdbgeo: error: interrupted\n"), std::string::npos) << r.err;
             answers.push_back(r.seconds - r.seconds_signalled);
         }
+        EXPECT_FALSE(answers.empty());
         // The middle one: a busy machine may hold up one or two.
         if (sanitized || answers.empty()) return;
         std::sort(answers.begin(), answers.end());
@@ -119,7 +119,5 @@ TEST_F(Kill, WritingAMap) {
         GTEST_SKIP() << "NOT TESTED: files without a name cannot be made here, so a temporary one may stay";
 }
 
-TEST_F(Kill, InterruptingAGrid) { interrupt(to_grid(), SIGINT); }
-TEST_F(Kill, TerminatingAGrid) { interrupt(to_grid(), SIGTERM); }
-TEST_F(Kill, InterruptingAMap) { interrupt(to_map(), SIGINT); }
-TEST_F(Kill, TerminatingAMap) { interrupt(to_map(), SIGTERM); }
+TEST_F(Kill, InterruptedWhileWritingAGrid) { interrupt(to_grid()); }
+TEST_F(Kill, InterruptedWhileWritingAMap) { interrupt(to_map()); }

@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -37,6 +38,7 @@ struct RunOptions {
     int signal = SIGKILL;                                   ///< what is sent, where one of these is set:
     std::optional<std::chrono::milliseconds> signal_after;  ///< after the start, or
     std::optional<std::string> signal_at;  ///< once standard error has this text (empty: anything)
+    bool signal_heard = false;             ///< not before the program has a handler for it
     std::chrono::seconds give_up{240};     ///< then it is killed
 };
 
@@ -71,6 +73,15 @@ namespace run_detail {
     ::_exit(127);
 }
 
+/// Whether a process has a handler for a signal: it has none while its libraries are being loaded.
+inline bool handles(pid_t pid, int signal) {
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.rfind("SigCgt:", 0) == 0)
+            return std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1;
+    return false;
+}
+
 }  // namespace run_detail
 
 /// Runs `command` (the program's path and its arguments) and waits for its end. Exit code 127: there is no
@@ -90,6 +101,7 @@ inline Ended run(const std::vector<std::string>& command, const RunOptions& opti
     std::array<std::string*, 2> texts{&result.out, &result.err};
     std::array<pollfd, 2> watched{pollfd{pipes[0][0], POLLIN, 0}, pollfd{pipes[1][0], POLLIN, 0}};
     const auto send = [&](int signal) {
+        if (options.signal_heard && !run_detail::handles(pid, signal)) return;
         if (std::exchange(result.signalled, true)) return;
         result.seconds_signalled = std::chrono::duration<double>(clock::now() - start).count();
         ::kill(pid, signal);

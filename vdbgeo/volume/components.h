@@ -16,7 +16,7 @@ namespace vdbgeo {
 ///
 /// Blocks of 128³ voxels are searched in parallel, run by run with a union-find; only components that touch a
 /// block's border are known beyond it, so that noise of billions of voxels takes, beside the mask, 8 bytes
-/// for each run of voxels along a block's faces and 16 for each component there, and up to 15 MB a thread.
+/// for each run of voxels along a block's faces and 20 for each component there, and up to 15 MB a thread.
 /// Not recursive. The result does not depend on the number of threads. Leaves and nodes that are empty then
 /// are removed, full leaves become tiles. Where `progress` cancels, some of the small components are gone.
 std::uint64_t remove_small_components(openvdb::MaskTree& mask, std::uint64_t min_voxels,

@@ -202,11 +202,11 @@ TEST(RealMaps, VoxelsLieWhereOthersSay) {
     int maps = 0, odd = 0;
     for (std::string line; std::getline(told, line);) {
         std::istringstream words(line);
-        std::string path;
+        std::string path, number;
         Vec3i at;
         Vec3d position;
-        float value = 0;
-        words >> path >> at[0] >> at[1] >> at[2] >> position[0] >> position[1] >> position[2] >> value;
+        words >> path >> at[0] >> at[1] >> at[2] >> position[0] >> position[1] >> position[2] >> number;
+        const float value = std::strtof(number.c_str(), nullptr);
         if (path != last) {
             MapReadOptions options;
             // Bytes that a writer meant as unsigned are a matter of taste; the script takes them as signed.

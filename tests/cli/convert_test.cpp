@@ -256,9 +256,9 @@ TEST_F(Convert, ScalingIsStatedInTheResultAndInALabel) {
     EXPECT_EQ(o, offset);
     EXPECT_NE(good({"convert", map, at("b.mrc"), "--mode", "1", "--scale", "auto"}).out.find("largest error"),
               std::string::npos);
-    const Json given = json({"convert", map, at("b.mrc"), "--mode", "6", "--scale", "0.01,-5"});
+    const Json given = json({"convert", map, at("b.mrc"), "--mode", "6", "--scale", "0.01,-500"});
     EXPECT_EQ(given["scaling"]["factor"], 0.01);
-    EXPECT_EQ(given["scaling"]["offset"], -5);
+    EXPECT_EQ(given["scaling"]["offset"], -500);
     const Json halves = json({"convert", map, at("b.mrc"), "--mode", "12"});
     EXPECT_EQ(halves["scaling"]["factor"], 1);
     EXPECT_GT(halves["scaling"]["largest_error"], 0);

@@ -291,6 +291,15 @@ TEST_F(Convert, AGridIsWrittenTheSameWhetherItIsLoadedOrNot) {
     EXPECT_TRUE(bytes("streamed.mrc") == bytes("loaded.mrc"));
 }
 
+TEST_F(Convert, AGridIsWrittenInLessMemoryThanItTakesToLoadIt) {
+    if (sanitized) GTEST_SKIP() << "memory is not told under a sanitizer";
+    good({"convert", phantom("a.mrc", 280), at("a.vdb")});  // 88 MB
+    EXPECT_GT(good({"convert", at("a.vdb"), at("loaded.mrc"), "--quiet", "--voxel-size", "3"}).peak_bytes,
+              110'000'000u);
+    EXPECT_LT(good({"convert", at("a.vdb"), at("streamed.mrc"), "--quiet"}).peak_bytes, 80'000'000u);
+    EXPECT_TRUE(bytes("streamed.mrc") == bytes("loaded.mrc"));
+}
+
 TEST_F(Convert, AFlippedByteInAGridIsRefusedOrHarmless) {
     const std::string map = phantom("a.mrc", 24);
     good({"convert", map, at("a.vdb")});

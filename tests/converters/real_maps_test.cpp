@@ -106,8 +106,10 @@ TEST(RealMaps, ToVdbAndBackWithNothingLost) {
         expect_same_frame(before.frame(), after.frame());
         EXPECT_EQ(before.order(), after.order());
         EXPECT_TRUE(same_bits(samples(path), samples(b)));
+        // What departs from the format is what departed before: a sampling is kept as it was.
+        const std::vector<std::string> before_lines = validate_mrc(path);
         for (const std::string& line : validate_mrc(b))
-            if (line.find("not finite") == std::string::npos) ADD_FAILURE() << line;
+            EXPECT_EQ(std::count(before_lines.begin(), before_lines.end(), line), 1) << line;
         const std::string data = plain_data(path);
         if (!data.empty()) {
             ++with_bytes;

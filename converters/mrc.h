@@ -44,9 +44,10 @@ struct MrcHeader {
 };
 
 /// Which header words give the world position of the first sample. ORIGIN is plausible where it is finite,
-/// not zero, and no further away than ten times the longest edge of the box; NSTART where it is not over ten
-/// times both the box and M. A file with ORIGIN at zero and LSKFLG 1 is a CCP4 file older than MRC2014 with a
-/// skew transformation, map = S·(world − t): its axes are turned by S⁻¹, and `automatic` adds t.
+/// not zero, and along each axis no further away than ten times the longest edge of the box; NSTART where it
+/// is not over ten times both the box and M. A file with ORIGIN at zero and LSKFLG 1 is a CCP4 file older
+/// than MRC2014 with a skew transformation, map = S·(world − t): its axes are turned by S⁻¹, and `automatic`
+/// adds t.
 enum class OriginRule {
     automatic,  ///< ORIGIN where it is set and plausible, else NSTART, else zero
     header,     ///< words 50–52
@@ -148,7 +149,7 @@ struct MrcWriteOptions {
         none,       ///< values are stored as they are
         automatic,  ///< modes 0, 1, 6, 101: the range of the values becomes the whole range of the mode; mode
                     ///< 12: scaled only where a value lies beyond ±65504; mode 2: none
-        given  ///< MrcWriteOptions::given
+        given       ///< MrcWriteOptions::given
     };
 
     /// 0, 1, 2, 6, 12 or 101. Unset: the mode of the file that the map came from (metadata mrc_mode), else 2.

@@ -234,3 +234,85 @@ TEST_F(Convert, TheSmallProgramsDoTheSame) {
     EXPECT_TRUE(bytes("b.mrc") == bytes("c.mrc"));
     EXPECT_TRUE(data_of(bytes("b.mrc")) == data_of(bytes("a.mrc")));
 }
+
+TEST_F(Convert, ScalingIsStatedInTheResultAndInALabel) {
+    const std::string map = phantom("a.mrc", 24);
+    const Json j = json({"convert", map, at("b.mrc"), "--mode", "1", "--scale", "auto"});
+    const double factor = j["scaling"]["factor"], offset = j["scaling"]["offset"],
+                 error = j["scaling"]["largest_error"];
+    EXPECT_GT(factor, 0);
+    EXPECT_GT(error, 0);
+    EXPECT_LE(error, 0.5 * factor * (1 + 1e-9));
+    const Json before = json({"info", map}), after = json({"info", at("b.mrc")});
+    EXPECT_EQ(after["min"], -32768);
+    EXPECT_EQ(after["max"], 32767);
+    EXPECT_NEAR(factor * after["mean"].get<double>() + offset, before["mean"], error);
+    std::string label;
+    for (const Json& l : after["labels"])
+        if (l.get<std::string>().rfind("vdbgeo: density = ", 0) == 0) label = l;
+    double f = 0, o = 0;
+    ASSERT_EQ(std::sscanf(label.c_str(), "vdbgeo: density = %lf * stored + %lf", &f, &o), 2) << label;
+    EXPECT_EQ(f, factor);
+    EXPECT_EQ(o, offset);
+    EXPECT_NE(good({"convert", map, at("b.mrc"), "--mode", "1", "--scale", "auto"}).out.find("largest error"),
+              std::string::npos);
+    const Json given = json({"convert", map, at("b.mrc"), "--mode", "6", "--scale", "0.01,-500"});
+    EXPECT_EQ(given["scaling"]["factor"], 0.01);
+    EXPECT_EQ(given["scaling"]["offset"], -500);
+    const Json halves = json({"convert", map, at("b.mrc"), "--mode", "12"});
+    EXPECT_EQ(halves["scaling"]["factor"], 1);
+    EXPECT_GT(halves["scaling"]["largest_error"], 0);
+    EXPECT_EQ(json({"convert", map, at("b.mrc")})["scaling"]["largest_error"], 0);
+}
+
+TEST_F(Convert, CompressedMapsHoldThePlainOnes) {
+    const std::string map = phantom("a.mrc", 40);
+    good({"convert", map, at("a.vdb")});
+    good({"convert", at("a.vdb"), at("b.mrc")});
+    good({"convert", at("a.vdb"), at("b.mrc.gz")});
+    good({"convert", map, at("c.map"), "--compress", "gz"});
+    EXPECT_TRUE(bytes("b.mrc.gz") == bytes("c.map"));
+    EXPECT_EQ(run({"/bin/sh", "-c", "gzip -dc < " + at("b.mrc.gz") + " | cmp - " + at("b.mrc")}).code, 0);
+    good({"convert", at("b.mrc.gz"), at("d.mrc")});
+    EXPECT_TRUE(bytes("d.mrc") == bytes("b.mrc"));
+    RunOptions pipe;
+    pipe.output = at("e.mrc.gz");
+    good({"convert", at("a.vdb"), "-", "--compress", "gz", "--mode", "1", "--scale", "auto"}, pipe);
+    good({"convert", at("a.vdb"), at("f.mrc.gz"), "--mode", "1", "--scale", "auto"});
+    EXPECT_TRUE(bytes("e.mrc.gz") == bytes("f.mrc.gz")) << "statistics first or last";
+}
+
+TEST_F(Convert, AGridIsWrittenTheSameWhetherItIsLoadedOrNot) {
+    const std::string map = phantom("a.mrc", 40);
+    good({"convert", map, at("a.vdb"), "--threshold", "1sigma"});
+    good({"convert", at("a.vdb"), at("streamed.mrc")});
+    // A flag that has no meaning for a grid, and is warned of, makes it be loaded.
+    good({"convert", at("a.vdb"), at("loaded.mrc"), "--voxel-size", "3"});
+    EXPECT_TRUE(bytes("streamed.mrc") == bytes("loaded.mrc"));
+}
+
+TEST_F(Convert, AGridIsWrittenInLessMemoryThanItTakesToLoadIt) {
+    if (sanitized) GTEST_SKIP() << "memory is not told under a sanitizer";
+    good({"convert", phantom("a.mrc", 280), at("a.vdb")});  // 88 MB
+    EXPECT_GT(good({"convert", at("a.vdb"), at("loaded.mrc"), "--quiet", "--voxel-size", "3"}).peak_bytes,
+              110'000'000u);
+    EXPECT_LT(good({"convert", at("a.vdb"), at("streamed.mrc"), "--quiet"}).peak_bytes, 80'000'000u);
+    EXPECT_TRUE(bytes("streamed.mrc") == bytes("loaded.mrc"));
+}
+
+TEST_F(Convert, AFlippedByteInAGridIsRefusedOrHarmless) {
+    const std::string map = phantom("a.mrc", 24);
+    good({"convert", map, at("a.vdb")});
+    good({"convert", at("a.vdb"), at("good.mrc")});
+    const std::string grid = bytes("a.vdb");
+    for (std::size_t i = 0; i < 40; ++i) {
+        std::string flipped = grid;
+        flipped[i < 10 ? 9 * i : i * 7919 % grid.size()] ^= static_cast<char>(1 << i % 8);
+        const Ended r = vdbgeo({"convert", make("b.vdb", flipped), at("b.mrc"), "--quiet"});
+        if (r.code == 0) {
+            EXPECT_TRUE(bytes("b.mrc") == bytes("good.mrc")) << i;
+        } else {
+            expect_error(r, 3, at("b.vdb") + ": ");
+        }
+    }
+}

@@ -59,7 +59,8 @@ std::string plain_data(const fs::path& path) {
     const MrcReader reader(path);
     if (reader.header().swapped || reader.volumes() > 1 || reader.value_type() == "int8 scaled") return "";
     const std::string bytes = read_bytes(path);
-    if (bytes.compare(208, 3, "MAP") != 0) return "";  // compressed, or older than the word
+    if (bytes.size() < 1024 || bytes.compare(208, 3, "MAP") != 0)
+        return "";  // compressed, or older than the word
     const std::size_t begin = 1024 + static_cast<std::size_t>(reader.header().nsymbt);
     const std::string written = begin < bytes.size() ? bytes.substr(begin) : "";
     const bool whole = reader.warnings().empty();
@@ -105,8 +106,10 @@ TEST(RealMaps, ToVdbAndBackWithNothingLost) {
         expect_same_frame(before.frame(), after.frame());
         EXPECT_EQ(before.order(), after.order());
         EXPECT_TRUE(same_bits(samples(path), samples(b)));
+        // What departs from the format is what departed before: a sampling is kept as it was.
+        const std::vector<std::string> before_lines = validate_mrc(path);
         for (const std::string& line : validate_mrc(b))
-            if (line.find("not finite") == std::string::npos) ADD_FAILURE() << line;
+            EXPECT_EQ(std::count(before_lines.begin(), before_lines.end(), line), 1) << line;
         const std::string data = plain_data(path);
         if (!data.empty()) {
             ++with_bytes;
@@ -163,7 +166,7 @@ TEST(RealMaps, MrcfileAcceptsWhatIsWritten) {
         "print(*bad); sys.exit(len(bad) > 0)'";
     EXPECT_EQ(std::system((validate + files).c_str()), 0);
     test::MrcBytes wrong;
-    wrong.set(20, 99.f);
+    wrong.set(21, 99.f);
     test::write_bytes(folder / "wrong.mrc", wrong.str());
     EXPECT_NE(std::system((validate + " " + (folder / "wrong.mrc").string() + " > /dev/null").c_str()), 0)
         << "the check can fail";
@@ -202,11 +205,11 @@ TEST(RealMaps, VoxelsLieWhereOthersSay) {
     int maps = 0, odd = 0;
     for (std::string line; std::getline(told, line);) {
         std::istringstream words(line);
-        std::string path;
+        std::string path, number;
         Vec3i at;
         Vec3d position;
-        float value = 0;
-        words >> path >> at[0] >> at[1] >> at[2] >> position[0] >> position[1] >> position[2] >> value;
+        words >> path >> at[0] >> at[1] >> at[2] >> position[0] >> position[1] >> position[2] >> number;
+        const float value = std::strtof(number.c_str(), nullptr);
         if (path != last) {
             MapReadOptions options;
             // Bytes that a writer meant as unsigned are a matter of taste; the script takes them as signed.
@@ -231,5 +234,5 @@ TEST(RealMaps, VoxelsLieWhereOthersSay) {
     }
     std::cout << maps << " maps, " << odd << " with odd axes, an origin or a skewed cell\n";
     EXPECT_GE(maps, 50);
-    EXPECT_GE(odd, 35);
+    EXPECT_GE(odd, 30);
 }

@@ -61,13 +61,17 @@ class Map:
         size = self.values.shape
         if any(m <= 0 for m in self.sampling):
             self.sampling = list(size)
-        if min(lengths) == 0:
-            lengths = [float(m) for m in self.sampling]
-        # A cell over M that makes one axis ten times the others, while the cell over N does not: N it is.
+        # On an axis without a cell: 1 Å.
+        for a in range(3):
+            if lengths[a] / self.sampling[a] <= 1e-4:
+                self.sampling[a] = size[a]
+                lengths[a] = float(size[a])
+        # M that makes one axis ten times the others, while N makes it like them: N it is.
         by_m = [c / m for c, m in zip(lengths, self.sampling)]
-        by_n = [c / n for c, n in zip(lengths, size)]
-        if max(by_m) > 10 * min(by_m) and max(by_n) <= 10 * min(by_n):
-            self.sampling = list(size)
+        for a in range(3):
+            others = [by_m[b] for b in range(3) if b != a]
+            if by_m[a] > 10 * max(others) and min(others) / 2 <= lengths[a] / size[a] <= 2 * max(others):
+                self.sampling[a] = size[a]
         self.cell = gemmi.UnitCell(*lengths, *angles)
         self.origin = self.find_origin(data)
 
@@ -82,7 +86,7 @@ class Map:
         edge = max(np.linalg.norm(self.step([size[a] if a == b else 0 for a in range(3)])) for b in range(3))
         origin = np.array([float(v) for v in self.floats[49:52]])
         self.rule = "origin"
-        if np.isfinite(origin).all() and origin.any() and np.linalg.norm(origin) <= 10 * edge:
+        if np.isfinite(origin).all() and origin.any() and np.abs(origin).max() <= 10 * edge:
             return origin
         start = self.nstart
         if any(abs(s) > 10 * max(n, m) for s, n, m in zip(start, size, self.sampling)):

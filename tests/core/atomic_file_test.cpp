@@ -145,3 +145,21 @@ TEST(AtomicFile, AKilledWriterLeavesTheOldFile) {
     EXPECT_TRUE(WIFSIGNALED(status));
     EXPECT_EQ(read_bytes(folder / "a"), "old");
 }
+
+TEST(AtomicFile, WhatWasWrittenCanBeReadBackAndOverwritten) {
+    TempFolder folder;
+    AtomicFile file(folder / "a");
+    EXPECT_TRUE(file.seekable());
+    file.write("head, ");
+    file.write(std::string(3 << 20, 'x'));
+    EXPECT_EQ(file.flush(), 6u + (3u << 20));
+    std::string back(4, '\0');
+    file.read_at(0, back.data(), back.size());
+    EXPECT_EQ(back, "head");
+    file.write_at(0, "HEAD", 4);
+    file.write(" end");
+    EXPECT_THROW(file.read_at(10u << 20, back.data(), back.size()), IoError) << "beyond the end";
+    file.commit();
+    EXPECT_TRUE(read_bytes(folder / "a") == "HEAD, " + std::string(3 << 20, 'x') + " end");
+    EXPECT_FALSE(AtomicFile("/dev/null").seekable());
+}

@@ -279,7 +279,7 @@ std::uint64_t PackedLeaves::bytes_as_tree() const {
 }
 
 StreamedGrid::StreamedGrid(std::shared_ptr<const PackedLeaves> leaves, float background)
-    : openvdb::FloatGrid(background), leaves_(std::move(leaves)) {
+    : SelfWritingGrid(background), leaves_(std::move(leaves)) {
     setName("density");
     setGridClass(openvdb::GRID_UNKNOWN);
     setSaveFloatAsHalf(leaves_->half());

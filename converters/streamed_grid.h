@@ -70,7 +70,7 @@ class PackedLeaves {
 
 /// PackedLeaves as a grid: metadata and transform as of any grid; the tree is empty, and only the counts, the
 /// bounding box and what is written to a file are those of the leaves.
-class StreamedGrid : public openvdb::FloatGrid, public SelfWritingGrid {
+class StreamedGrid : public SelfWritingGrid {
  public:
     StreamedGrid(std::shared_ptr<const PackedLeaves> leaves, float background);
 
@@ -78,17 +78,13 @@ class StreamedGrid : public openvdb::FloatGrid, public SelfWritingGrid {
     openvdb::CoordBBox evalActiveVoxelBoundingBox() const override { return leaves_->active_box(); }
     openvdb::Index64 memUsage() const override { return leaves_->bytes_as_tree(); }
     bool empty() const override { return leaves_->active_voxels() == 0; }
-    void writeTopology(std::ostream& os) const override { leaves_->write_topology(os, background()); }
-    void writeBuffers(std::ostream& os) const override { leaves_->write_buffers(os, progress_); }
-    openvdb::GridBase::Ptr copyGrid() override { return std::make_shared<StreamedGrid>(*this); }
-    openvdb::GridBase::ConstPtr copyGrid() const override { return std::make_shared<StreamedGrid>(*this); }
-
-    void report_to(const Progress& progress) const override { progress_ = progress; }
+    void writeBuffers(std::ostream& os) const override { leaves_->write_buffers(os, progress()); }
     const PackedLeaves& leaves() const { return *leaves_; }
 
  private:
+    void write_nodes(std::ostream& os) const override { leaves_->write_topology(os, background()); }
+
     std::shared_ptr<const PackedLeaves> leaves_;
-    mutable Progress progress_;  // it does not change the grid
 };
 
 }  // namespace vdbgeo

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
-#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/io/io.h>
 #include <tbb/parallel_pipeline.h>
 
@@ -21,10 +20,10 @@ using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
 
 /// The same grid, whose leaf buffers are serialised on all threads: OpenVDB writes them one after another.
-class ParallelGrid : public FloatGrid {
+class ParallelGrid : public SelfWritingGrid {
  public:
-    ParallelGrid(const FloatGrid& grid, const Progress& progress)
-        : FloatGrid(std::const_pointer_cast<FloatTree>(grid.constTreePtr())), progress_(progress) {
+    explicit ParallelGrid(const FloatGrid& grid)
+        : SelfWritingGrid(std::const_pointer_cast<FloatTree>(grid.constTreePtr())) {
         static_cast<openvdb::MetaMap&>(*this) = grid;
         setTransform(grid.transform().copy());
     }
@@ -57,7 +56,7 @@ class ParallelGrid : public FloatGrid {
         const auto write = [&](const std::shared_ptr<std::string>& bytes) {
             os.write(bytes->data(), static_cast<std::streamsize>(bytes->size()));
             written += chunk;
-            progress_.report(static_cast<double>(written) / static_cast<double>(leaves.size()));
+            progress().report(static_cast<double>(written) / static_cast<double>(leaves.size()));
         };
         tbb::parallel_pipeline(
             16, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, take) &
@@ -68,8 +67,9 @@ class ParallelGrid : public FloatGrid {
     }
 
  private:
+    void write_nodes(std::ostream& os) const override { FloatGrid::writeTopology(os); }
+
     static constexpr std::size_t chunk = 256;  // leaves: half a megabyte
-    Progress progress_;
 };
 
 /// Archive's writer is for derived classes only.
@@ -97,24 +97,6 @@ std::string identifier_of(const openvdb::GridCPtrVec& grids) {
                        hash[0] & 0xFFF, hash[1] >> 52, hash[1] & 0xFFFFFFFFFFFFull);
 }
 
-/// Keeps OpenVDB from adding notes for delayed loading, for which it would compress every leaf once more:
-/// half the time of writing. Files without them, as OpenVDB 4 wrote them, are read by all.
-class NoDelayedLoadNotes {
- public:
-    NoDelayedLoadNotes() : registered_(Notes::isRegisteredType()) {
-        if (registered_) Notes::unregisterType();
-    }
-    ~NoDelayedLoadNotes() {
-        if (registered_) Notes::registerType();
-    }
-    NoDelayedLoadNotes(const NoDelayedLoadNotes&) = delete;
-    NoDelayedLoadNotes& operator=(const NoDelayedLoadNotes&) = delete;
-
- private:
-    using Notes = openvdb::io::DelayedLoadMetadata;
-    bool registered_;
-};
-
 /// What the archive writes in the place of a grid.
 openvdb::GridBase::ConstPtr prepared(const openvdb::GridBase::ConstPtr& grid, const VdbWriteOptions& options,
                                      const Progress& progress) {
@@ -124,9 +106,10 @@ openvdb::GridBase::ConstPtr prepared(const openvdb::GridBase::ConstPtr& grid, co
     }
     openvdb::GridBase::Ptr copy;
     if (const auto floats = openvdb::GridBase::grid<FloatGrid>(grid))
-        copy = std::make_shared<ParallelGrid>(*floats, progress);
+        copy = std::make_shared<ParallelGrid>(*floats);
     else
         copy = std::const_pointer_cast<openvdb::GridBase>(grid->copyGrid());
+    if (const auto* own = dynamic_cast<const SelfWritingGrid*>(copy.get())) own->report_to(progress);
     if (copy->saveFloatAsHalf() != options.half) copy->setSaveFloatAsHalf(options.half);
     return copy;
 }
@@ -153,7 +136,6 @@ void write_vdb(const std::vector<openvdb::GridBase::ConstPtr>& grids, const std:
                      progress.part(static_cast<double>(g) / many, static_cast<double>(g + 1) / many)));
     }
     AtomicFile file(path);
-    const NoDelayedLoadNotes no_notes;
     Writer writer;
     writer.setCompression(flags);
     try {

@@ -81,6 +81,21 @@ FogRange range_of_fog(const MapFile& in, const SceneFlags& flags) {
     return fog_range(in.map.statistics, flags.fog_options.value_or(FogOptions{}));
 }
 
+/// The voxels that a scene shows: those of its fog and of the band of its surface. What colours them is not
+/// needed elsewhere. Unset where there is neither, or where the surface has voxels of its own.
+openvdb::BoolGrid::Ptr shown_voxels(const MapFile& in, const SceneFlags& flags,
+                                    const std::vector<GridBase::Ptr>& grids) {
+    if (!flags.placement) return {};
+    openvdb::BoolGrid::Ptr shown;
+    for (const auto& grid : grids) {
+        const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid);
+        if (!(floats->transform() == in.map.grid->transform())) return {};
+        if (!shown) shown = openvdb::BoolGrid::create();
+        shown->tree().topologyUnion(floats->tree());
+    }
+    return shown;
+}
+
 /// The density: fog for a program or on demand, else the map as it is.
 GridBase::Ptr density_grid(const MapFile& in, const SceneFlags& flags, SceneLevels& levels,
                            const Progress& progress) {
@@ -101,11 +116,11 @@ GridBase::Ptr density_grid(const MapFile& in, const SceneFlags& flags, SceneLeve
 }
 
 GridBase::Ptr added_grid(const std::string& file, const MapFile& in, const std::string& name,
-                         const std::string& added, Session& session) {
+                         const std::string& added, const openvdb::BoolGrid::Ptr& shown, Session& session) {
     const MapFile other = read_map(added, {}, session.stage("reading " + name));
     for (const std::string& w : other.warnings) session.warn(added + ": " + w);
     const SampledMap sampled =
-        naming(added, [&] { return sample_on(other.map, in.map, name, session.stage(name)); });
+        naming(added, [&] { return sample_on(other.map, in.map, name, {shown}, session.stage(name)); });
     if (sampled.frames_differ)
         session.warn(
             fmt::format("{}: its place or voxel size ({:.6g} Å) is not that of {} ({:.6g} Å), but both boxes "
@@ -182,19 +197,23 @@ std::vector<GridBase::ConstPtr> scene_grids(const std::string& file, MapFile in,
                                             SceneLevels& levels, Session& session) {
     return naming(file, [&] {
         take_back(file, in, session);
+        const auto names = default_grids(in, flags);
+        const auto asked = [&](const char* name) {
+            return std::find(names.begin(), names.end(), name) != names.end();
+        };
         std::vector<GridBase::Ptr> grids;
-        for (const std::string& name : default_grids(in, flags)) {
-            const auto progress = session.stage(name);
-            if (name == "density") grids.push_back(density_grid(in, flags, levels, progress));
-            if (name == "gradient") grids.push_back(gradient(in.map, progress));
-            if (name == "mean_curvature") grids.push_back(mean_curvature(in.map, progress));
-            if (name != "surface") continue;
+        if (asked("density")) grids.push_back(density_grid(in, flags, levels, session.stage("density")));
+        if (asked("surface")) {
             if (!levels.isovalue)
                 levels.isovalue = flags.isovalue.resolve(in.map.statistics, in.map.grid->getGridClass());
-            grids.push_back(level_set(in.map, *levels.isovalue, {}, progress));
+            grids.push_back(level_set(in.map, *levels.isovalue, {}, session.stage("surface")));
         }
+        const auto shown = shown_voxels(in, flags, grids);
+        if (asked("gradient")) grids.push_back(gradient(in.map, {shown}, session.stage("gradient")));
+        if (asked("mean_curvature"))
+            grids.push_back(mean_curvature(in.map, {shown}, session.stage("mean curvature")));
         for (const auto& [name, added] : flags.added)
-            grids.push_back(added_grid(file, in, name, added, session));
+            grids.push_back(added_grid(file, in, name, added, shown, session));
         if (flags.placement) {
             PlacementOptions placement = *flags.placement;
             if (!levels.centre_A)

@@ -57,9 +57,8 @@ TEST(NanoVdb, EveryVoxelOfARealMapComesBack) {
 
 TEST(NanoVdb, VectorsComeBack) {
     const test::TempFolder folder;
-    const DensityMap map = test::map_from_function(Vec3i(20, 12, 9), {}, [](const Vec3d& p) {
-        return p.x() * p.x() + 2 * p.y() - p.z();
-    });
+    const DensityMap map = test::map_from_function(
+        Vec3i(20, 12, 9), {}, [](const Vec3d& p) { return p.x() * p.x() + 2 * p.y() - p.z(); });
     const auto grid = gradient(map);
     write_nanovdb({grid}, folder / "g.nvdb");
     auto handle = nanovdb::io::readGrid((folder / "g.nvdb").string());

@@ -36,7 +36,8 @@ void convert_mesh(const ConvertOptions& o, Session& session) {
 Json convert_map(const ConvertOptions& o, SceneLevels& levels, Session& session) {
     Json seconds;
     Clock clock;
-    const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
+    MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
+    take_back(o.in, in, session);
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     if (in.map.grid->activeVoxelCount() == 0)

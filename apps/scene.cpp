@@ -65,16 +65,6 @@ std::pair<std::string, std::string> parse_addition(const std::string& text) {
 
 bool is_level_set(const MapFile& in) { return in.map.grid->getGridClass() == openvdb::GRID_LEVEL_SET; }
 
-/// A map that comes from a scene, back in Å.
-void take_back(const std::string& file, MapFile& in, Session& session) {
-    const auto placement = placement_of(*in.map.grid);
-    if (!placement) return;
-    undo_placement(*in.map.grid);
-    in.map = map_from_grid(in.map.grid);
-    session.warn(fmt::format("{}: it was placed for {}; it is taken back to Å first", file,
-                             name_of(placement->program)));
-}
-
 FogRange range_of_fog(const MapFile& in, const SceneFlags& flags) {
     const bool fog_already = in.map.grid->getGridClass() == openvdb::GRID_FOG_VOLUME;
     if (fog_already && !flags.fog_options) return {0, std::max(in.map.statistics.max, 1e-30)};
@@ -193,10 +183,18 @@ void SceneFlags::finish() {
     }
 }
 
-std::vector<GridBase::ConstPtr> scene_grids(const std::string& file, MapFile in, const SceneFlags& flags,
-                                            SceneLevels& levels, Session& session) {
+void take_back(const std::string& file, MapFile& in, Session& session) {
+    const auto placement = placement_of(*in.map.grid);
+    if (!placement) return;
+    undo_placement(*in.map.grid);
+    in.map = map_from_grid(in.map.grid);
+    session.warn(fmt::format("{}: it was placed for {}; it is taken back to Å first", file,
+                             name_of(placement->program)));
+}
+
+std::vector<GridBase::ConstPtr> scene_grids(const std::string& file, const MapFile& in,
+                                            const SceneFlags& flags, SceneLevels& levels, Session& session) {
     return naming(file, [&] {
-        take_back(file, in, session);
         const auto names = default_grids(in, flags);
         const auto asked = [&](const char* name) {
             return std::find(names.begin(), names.end(), name) != names.end();

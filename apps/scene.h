@@ -48,10 +48,12 @@ struct SceneLevels {
     std::optional<Vec3d> centre_A;
 };
 
-/// The grids of a scene from the map that was read from `file`. A map that was placed for a program before is
-/// taken back to Å first. Warnings go to the session. Errors as those of the steps, with the file's name
-/// before them.
-std::vector<openvdb::GridBase::ConstPtr> scene_grids(const std::string& file, MapFile in,
+/// A map that was placed for a program before, back in Å, with a warning; others stay as they are.
+void take_back(const std::string& file, MapFile& in, Session& session);
+
+/// The grids of a scene from the map, in Å, that was read from `file`. Warnings go to the session. Errors as
+/// those of the steps, with the file's name before them.
+std::vector<openvdb::GridBase::ConstPtr> scene_grids(const std::string& file, const MapFile& in,
                                                      const SceneFlags& flags, SceneLevels& levels,
                                                      Session& session);
 

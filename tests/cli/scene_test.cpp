@@ -97,6 +97,7 @@ TEST_F(Scene, ASceneCanBeMadeOfAScene) {
     const auto surface = grid("h.vdb", "surface");  // a level set stays one
     EXPECT_EQ(openvdb::tools::checkLevelSet(*surface), "");
     EXPECT_NEAR(surface->voxelSize()[0], 0.03, 1e-9);
+    EXPECT_NEAR(json({"convert", at("b.vdb"), at("back.vdb")})["transform"][0][0].get<double>(), 3, 1e-9);
 }
 
 TEST_F(Scene, ASeriesIsNumberedAndSharesItsLevels) {

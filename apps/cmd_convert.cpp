@@ -1,6 +1,8 @@
 // vdbgeo convert (also mrc2vdb and vdb2mrc): map, grid and mesh files into each other.
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/reports.h"
@@ -74,6 +76,9 @@ Json convert_map(const ConvertOptions& o, SceneLevels& levels, Session& session)
 /// Several maps, or all volumes of a stack, as numbered files at the same levels.
 void convert_series(ConvertOptions o, Session& session) {
     const std::string out = o.files.back();
+    for (std::size_t f = 0; f + 1 < o.files.size(); ++f)
+        if (!std::filesystem::exists(o.files[f]))
+            throw IoError(fmt::format("{}: cannot be opened: no such file", o.files[f]));
     SceneLevels levels;
     Json frames = Json::array();
     int number = 0;

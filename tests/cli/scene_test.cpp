@@ -118,6 +118,12 @@ TEST_F(Scene, ASeriesIsNumberedAndSharesItsLevels) {
     EXPECT_TRUE(bytes("one.vdb") == bytes("out_0001.vdb"));
 }
 
+TEST_F(Scene, AMissingFrameIsToldBeforeAnythingIsWritten) {
+    phantom("a.mrc", 24);
+    expect_error(vdbgeo({"convert", at("a.mrc"), at("b.mrc"), at("out.vdb"), "--quiet"}), 4, at("b.mrc"));
+    EXPECT_EQ(listing(), std::set<std::string>{"a.mrc"});
+}
+
 TEST_F(Scene, ABadFrameLeavesTheOthersWhole) {
     phantom("a.mrc", 24);
     make("bad.mrc", "no map");

@@ -106,7 +106,8 @@ TEST(Derivatives, OnlyChosenVoxelsHaveTheSameValues) {
     const auto some = mean_curvature(map, {within});
     const auto all = mean_curvature(map);
     EXPECT_EQ(some->activeVoxelCount(), 2u);
-    EXPECT_EQ(some->tree().getValue(openvdb::Coord(17, 9, 16)), all->tree().getValue(openvdb::Coord(17, 9, 16)));
+    EXPECT_EQ(some->tree().getValue(openvdb::Coord(17, 9, 16)),
+              all->tree().getValue(openvdb::Coord(17, 9, 16)));
     EXPECT_EQ(some->tree().getValue(openvdb::Coord(17, 10, 16)), 0.0f);
     EXPECT_EQ(gradient(map, {within})->activeVoxelCount(), 2u);
 }

@@ -11,8 +11,7 @@ namespace vdbgeo {
 
 /// Which densities become 0 and 1.
 struct FogOptions {
-    /// At or below this level the fog is 0. Neither a level set nor a fog volume has use for `automatic`:
-    /// here it is mean + 2 rms.
+    /// At or below this level the fog is 0. `automatic` means mean + 2 rms too.
     Isovalue low{Isovalue::Rule::sigma, 2};
     /// At or above this level the fog is 1. Unset: the map's maximum.
     std::optional<Isovalue> high;

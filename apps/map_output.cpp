@@ -79,7 +79,7 @@ void report_written(const std::string& path, const MrcWriteReport& report, Json&
                             report.mode, scaling.factor, scaling.offset, report.largest_error));
 }
 
-void convert_grid_to_map(const std::string& in, const std::string& out,
+Json convert_grid_to_map(const std::string& in, const std::string& out,
                          const std::optional<std::string>& grid, const MrcWriteOptions& options,
                          Session& session) {
     Json seconds;
@@ -99,10 +99,10 @@ void convert_grid_to_map(const std::string& in, const std::string& out,
         session.say(fmt::format("{}: {} active voxels, {:.1f} MB of samples", out, source.active_voxels(),
                                 j["dense_bytes"].get<double>() / 1e6));
     report_written(out, report, j, session);
-    session.result(j);
+    return j;
 }
 
-void convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
+Json convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
                         const MrcWriteOptions& write, Session& session) {
     Clock clock;
     const MapCopy copy = copy_map(in, out, read, write, session.stage("converting"));
@@ -127,7 +127,7 @@ void convert_map_to_map(const std::string& in, const std::string& out, const Map
                                 copy.frame.size.y(), copy.frame.size.z(), s.min, s.max));
     }
     report_written(out, copy.report, j, session);
-    session.result(j);
+    return j;
 }
 
 }  // namespace vdbgeo::app

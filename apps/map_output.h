@@ -21,12 +21,12 @@ void report_written(const std::string& path, const MrcWriteReport& report, Json&
 
 /// Writes a grid of a VDB file as a map file without loading it: its leaves are decoded slab by slab. The
 /// bytes are those that read_map and write_map give.
-void convert_grid_to_map(const std::string& in, const std::string& out,
+Json convert_grid_to_map(const std::string& in, const std::string& out,
                          const std::optional<std::string>& grid, const MrcWriteOptions& options,
                          Session& session);
 
 /// Writes a map file as another one, a few sections at a time.
-void convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
+Json convert_map_to_map(const std::string& in, const std::string& out, const MapReadOptions& read,
                         const MrcWriteOptions& write, Session& session);
 
 }  // namespace vdbgeo::app

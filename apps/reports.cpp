@@ -40,6 +40,7 @@ Json versions_json() {
             {"tbb", fmt::format("{}.{}", TBB_VERSION_MAJOR, TBB_VERSION_MINOR)},
             {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
             {"embree", VDBGEO_EMBREE_VERSION},
+            {"nanovdb", VDBGEO_NANOVDB_VERSION},
             {"cgal", VDBGEO_CGAL_VERSION},
             {"tetgen", VDBGEO_TETGEN_VERSION},
             {"netgen", VDBGEO_NETGEN_VERSION},

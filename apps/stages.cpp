@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "converters/nanovdb_file.h"
 #include "vdbgeo/surface/marching_cubes.h"
 #include "vdbgeo/view/plot.h"
 #include "vdbgeo/view/png.h"
@@ -39,15 +40,22 @@ void check_map_output(const std::string& path, Session& session) {
         if (has_ending(path, packed))
             throw UsageError(
                 fmt::format("{}: maps are written plain or as .mrc.gz; compress the file afterwards", path));
-    if (!is_vdb_ending(path) && !is_map_ending(path))
-        throw UsageError(fmt::format("{}: the ending tells the format: .vdb or .mrc .map .ccp4 .rec", path));
+    if (is_nanovdb_ending(path)) {
+        if (!have_nanovdb()) throw UsageError(fmt::format("{}: this build writes no NanoVDB files", path));
+    } else if (!is_vdb_ending(path) && !is_map_ending(path)) {
+        throw UsageError(
+            fmt::format("{}: the ending tells the format: .vdb .nvdb or .mrc .map .ccp4 .rec", path));
+    }
 }
 
 std::optional<MrcWriteReport> write_map(const DensityMap& map, const std::string& path,
                                         const VdbWriteOptions& vdb, const MrcWriteOptions& mrc,
                                         const Progress& progress) {
-    if (!is_vdb_ending(path)) return write_mrc(map, path, mrc, progress);
-    write_vdb({map.grid}, path, vdb, progress);
+    if (!is_vdb_ending(path) && !is_nanovdb_ending(path)) return write_mrc(map, path, mrc, progress);
+    if (is_vdb_ending(path))
+        write_vdb({map.grid}, path, vdb, progress);
+    else
+        write_nanovdb({map.grid}, path, progress);
     return std::nullopt;
 }
 

@@ -8,6 +8,7 @@
 #include "converters/map_passes.h"
 #include "converters/streamed_grid.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/placement.h"
 
 namespace vdbgeo {
 namespace {
@@ -52,6 +53,11 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
 MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
     MapFile result;
     const auto grid = read_vdb(path, options.grid);
+    if (const auto placement = placement_of(*grid)) {
+        undo_placement(*grid);
+        result.warnings.push_back(
+            fmt::format("it was placed for {}; it is taken back to Å", name_of(placement->program)));
+    }
     try {
         result.map = map_from_grid(grid);
     } catch (const InvalidInput& e) {

@@ -64,7 +64,7 @@ TEST_F(Contract, UsageErrorsAreTwo) {
         {"convert", map, out, "--threshold", "auto"},
         {"convert", map, out, "--band", "1"},
         {"convert", map, out, "--threshold", "1", "--band", "-1"},
-        {"convert", map, out, at("more.vdb")},
+        {"convert", map, out, at("more.ply")},
         {"phantom", "sphere"},
         {"phantom", "dragon", at("out.mrc")},
         {"phantom", "sphere", at("out.png")},

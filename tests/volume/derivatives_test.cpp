@@ -95,5 +95,22 @@ TEST(Derivatives, ASaddleHasBothSignsAndAPlaneNone) {
     EXPECT_LT(mean_curvature(pocket)->tree().getValue(openvdb::Coord(3, 7, 7)), -0.1);
 }
 
+TEST(Derivatives, OnlyChosenVoxelsHaveTheSameValues) {
+    const int n = 24;
+    const DensityMap map = map_from_function(Vec3i::Constant(n), centred_frame(n, 1.5),
+                                             [](const Vec3d& p) { return std::exp(-p.squaredNorm() / 100); });
+    const auto within = openvdb::BoolGrid::create();
+    within->tree().setValueOn(openvdb::Coord(3, 4, 5), true);
+    within->tree().setValueOn(openvdb::Coord(17, 9, 16), true);
+    within->tree().setValueOn(openvdb::Coord(40, 9, 16), true);  // not a voxel of the map
+    const auto some = mean_curvature(map, {within});
+    const auto all = mean_curvature(map);
+    EXPECT_EQ(some->activeVoxelCount(), 2u);
+    EXPECT_EQ(some->tree().getValue(openvdb::Coord(17, 9, 16)),
+              all->tree().getValue(openvdb::Coord(17, 9, 16)));
+    EXPECT_EQ(some->tree().getValue(openvdb::Coord(17, 10, 16)), 0.0f);
+    EXPECT_EQ(gradient(map, {within})->activeVoxelCount(), 2u);
+}
+
 }  // namespace
 }  // namespace vdbgeo

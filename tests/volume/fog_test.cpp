@@ -75,6 +75,16 @@ TEST(Fog, DefaultsAreTwoRmsAndTheMaximum) {
     EXPECT_DOUBLE_EQ(range.high, map.statistics.max);
 }
 
+TEST(Fog, AMaskIsFogToo) {
+    std::vector<float> values(19 * 13 * 11, 0.0f);
+    std::fill(values.begin(), values.begin() + 1300, 1.0f);  // mean + 2 rms lies beyond 1
+    const DensityMap map = map_from_values(odd_size, values);
+    ASSERT_GT(map.statistics.mean + 2 * map.statistics.rms, 1.0);
+    const auto fog = fog_volume(map);
+    EXPECT_EQ(fog->activeVoxelCount(), 1300u);
+    EXPECT_EQ(fog->tree().getValue(openvdb::Coord(0, 0, 0)), 1.0f);
+}
+
 TEST(Fog, WhatWasDroppedStaysClearAndTheInsideOfABandIsOpaque) {
     SparsifyOptions band;
     band.threshold = 1.0f;

@@ -41,21 +41,23 @@ class ToFog {
 
 void FogOptions::check() const {
     const auto plain = [](const Isovalue& v) { return v.rule == Isovalue::Rule::value; };
-    for (const Isovalue* level : {&low, high ? &*high : nullptr})
+    for (const Isovalue* level : {low ? &*low : nullptr, high ? &*high : nullptr})
         if (level && !std::isfinite(level->number))
             throw InvalidInput("a level of the fog is not a finite number");
-    if (high && plain(low) && plain(*high) && !(low.number < high->number))
-        throw InvalidInput(fmt::format("the fog's levels have to rise: {} to {}", low.number, high->number));
+    if (low && high && plain(*low) && plain(*high) && !(low->number < high->number))
+        throw InvalidInput(fmt::format("the fog's levels have to rise: {} to {}", low->number, high->number));
 }
 
 FogRange fog_range(const Statistics& statistics, const FogOptions& options) {
     options.check();
-    const Isovalue low = options.low.rule == Isovalue::Rule::automatic ? FogOptions{}.low : options.low;
+    const auto given = [](const std::optional<Isovalue>& level) {
+        return level && level->rule != Isovalue::Rule::automatic;
+    };
     FogRange range;
-    range.low = low.resolve(statistics);
-    range.high = options.high && options.high->rule != Isovalue::Rule::automatic
-                     ? options.high->resolve(statistics)
-                     : statistics.max;
+    range.high = given(options.high) ? options.high->resolve(statistics) : statistics.max;
+    range.low = given(options.low)
+                    ? options.low->resolve(statistics)
+                    : std::min(statistics.mean + 2 * statistics.rms, (statistics.mean + statistics.max) / 2);
     if (!std::isfinite(range.low) || !std::isfinite(range.high) || !(range.low < range.high))
         throw InvalidInput(
             fmt::format("no fog between {:.6g} and {:.6g}: the map's values lie between {:.6g} and {:.6g}",

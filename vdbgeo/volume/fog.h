@@ -11,9 +11,9 @@ namespace vdbgeo {
 
 /// Which densities become 0 and 1.
 struct FogOptions {
-    /// At or below this level the fog is 0. Neither a level set nor a fog volume has use for `automatic`:
-    /// here it is mean + 2 rms.
-    Isovalue low{Isovalue::Rule::sigma, 2};
+    /// At or below this level the fog is 0. Unset: mean + 2 rms, but not above the middle between mean and
+    /// maximum (in a mask, say, 2 rms lie beyond the maximum).
+    std::optional<Isovalue> low;
     /// At or above this level the fog is 1. Unset: the map's maximum.
     std::optional<Isovalue> high;
 

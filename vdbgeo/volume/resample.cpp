@@ -35,7 +35,7 @@ bool is_outside(const Frame& frame, const Vec3d& index) {
 }  // namespace
 
 SampledMap sample_on(const DensityMap& other, const DensityMap& reference, const std::string& name,
-                     const Progress& progress) {
+                     const SampleOptions& options, const Progress& progress) {
     if (name.empty()) throw InvalidInput("a grid without a name");
     SampledMap result;
     result.by_index = other.frame.bounded() && other.frame.size == reference.frame.size;
@@ -44,6 +44,7 @@ SampledMap sample_on(const DensityMap& other, const DensityMap& reference, const
     const float background = other.grid->background();
     const auto tree =
         std::make_shared<FloatTree>(reference.grid->constTree(), background, openvdb::TopologyCopy());
+    if (options.within) tree->topologyIntersection(options.within->constTree());
     tree->voxelizeActiveTiles();
     progress.report(0.1);
     const Mat3d to_index = other.frame.axes.inverse();

@@ -8,6 +8,11 @@
 
 namespace vdbgeo {
 
+struct SampleOptions {
+    /// Only those of the reference's active voxels that are active here too, index for index; unset: all.
+    openvdb::BoolGrid::ConstPtr within;
+};
+
 struct SampledMap {
     openvdb::FloatGrid::Ptr grid;
     bool by_index = false;       ///< index for index, since both boxes have the same size; else by position
@@ -27,6 +32,6 @@ struct SampledMap {
 ///
 /// Cost: one pass over the active voxels. Throws InvalidInput for a name that is empty; Cancelled.
 SampledMap sample_on(const DensityMap& other, const DensityMap& reference, const std::string& name,
-                     const Progress& progress = {});
+                     const SampleOptions& options = {}, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -282,7 +282,7 @@ StreamedGrid::StreamedGrid(std::shared_ptr<const PackedLeaves> leaves, float bac
     : SelfWritingGrid(background), leaves_(std::move(leaves)) {
     setName("density");
     setGridClass(openvdb::GRID_UNKNOWN);
-    setSaveFloatAsHalf(leaves_->half());
+    if (leaves_->half()) setSaveFloatAsHalf(true);
 }
 
 }  // namespace vdbgeo

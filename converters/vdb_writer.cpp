@@ -25,7 +25,8 @@ class ParallelGrid : public SelfWritingGrid {
     explicit ParallelGrid(const FloatGrid& grid)
         : SelfWritingGrid(std::const_pointer_cast<FloatTree>(grid.constTreePtr())) {
         static_cast<openvdb::MetaMap&>(*this) = grid;
-        setTransform(grid.transform().copy());
+        // Not a copy: that would take the scale from differences of moved points, and round it.
+        setTransform(std::const_pointer_cast<openvdb::math::Transform>(grid.constTransformPtr()));
     }
 
     void writeBuffers(std::ostream& os) const override {

@@ -109,7 +109,7 @@ struct PlainGrid : SelfWritingGrid {
     explicit PlainGrid(const FloatGrid& grid)
         : SelfWritingGrid(std::const_pointer_cast<openvdb::FloatTree>(grid.constTreePtr())) {
         static_cast<openvdb::MetaMap&>(*this) = grid;
-        setTransform(grid.transform().copy());
+        setTransform(std::const_pointer_cast<openvdb::math::Transform>(grid.constTransformPtr()));
     }
     void write_nodes(std::ostream& os) const override { FloatGrid::writeTopology(os); }
     void writeBuffers(std::ostream& os) const override {

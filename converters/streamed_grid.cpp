@@ -25,6 +25,52 @@ std::uint16_t slot_of(const Coord& origin) {
     return static_cast<std::uint16_t>((origin.x() >> 3 & 15) << 8 | (origin.y() >> 3 & 15) << 4 | (origin.z() >> 3 & 15));
 }
 
+/// The active voxels' box, from the bits of the mask: a word for each x, eight bits in it for each y.
+void expand(openvdb::CoordBBox& box, const Coord& origin, const std::uint64_t* words) {
+    std::uint64_t all = 0;
+    int low[3] = {8, 0, 0}, high[3] = {-1, 7, 7};
+    for (int x = 0; x < 8; ++x) {
+        all |= words[x];
+        if (words[x] == 0) continue;
+        low[0] = std::min(low[0], x);
+        high[0] = x;
+    }
+    if (all == 0) return;
+    low[1] = __builtin_ctzll(all) / 8;
+    high[1] = 7 - __builtin_clzll(all) / 8;
+    std::uint64_t z = all | all >> 32;
+    z |= z >> 16;
+    z = (z | z >> 8) & 255;
+    low[2] = __builtin_ctzll(z);
+    high[2] = 63 - __builtin_clzll(z);
+    box.expand(openvdb::CoordBBox(origin + Coord(low[0], low[1], low[2]), origin + Coord(high[0], high[1], high[2])));
+}
+
+/// Writes the values of a leaf as LeafNode::writeBuffers does behind the mask. Where nothing but the background is
+/// inactive, as everywhere without a band, there is no need to look for other inactive values.
+void write_values(std::ostream& out, const Leaf& leaf, const VdbWriteOptions& options, bool only_background) {
+    const auto& mask = leaf.getValueMask();
+    const float* values = leaf.buffer().data();
+    if (options.half || !only_background) {
+        openvdb::io::writeCompressedValues(out, const_cast<float*>(values), Leaf::SIZE, mask, Leaf::NodeMaskType(),
+                                           options.half);
+        return;
+    }
+    out.put(openvdb::io::NO_MASK_OR_INACTIVE_VALS);
+    float active[Leaf::SIZE];
+    std::size_t count = 0;
+    for (std::uint32_t n = 0; n < 8; ++n)
+        for (std::uint64_t word = mask.getWord<std::uint64_t>(n); word != 0; word &= word - 1)
+            active[count++] = values[64 * n + static_cast<std::uint32_t>(__builtin_ctzll(word))];
+    const char* bytes = reinterpret_cast<const char*>(active);
+    if (options.compression == VdbWriteOptions::Compression::blosc)
+        openvdb::io::bloscToStream(out, bytes, sizeof(float), count);
+    else if (options.compression == VdbWriteOptions::Compression::zip)
+        openvdb::io::zipToStream(out, bytes, count * sizeof(float));
+    else
+        out.write(bytes, static_cast<std::streamsize>(count * sizeof(float)));
+}
+
 }  // namespace
 
 struct PackedLeaves::Head {
@@ -60,7 +106,10 @@ struct PackedLeaves::Node {
 
 PackedLeaves::PackedLeaves(const StripSorter& sorter, const VdbWriteOptions& options, std::uint64_t memory,
                            const std::filesystem::path& scratch)
-    : options_(options), order_(sorter.order()), store_(memory, scratch) {
+    : options_(options),
+      order_(sorter.order()),
+      only_background_(!sorter.options().band),
+      store_(memory, scratch) {
     const Vec3i& size = sorter.size();
     nodes_ = Coord(node_of(size.x() - 1) + 1, node_of(size.y() - 1) + 1, node_of(size.z() - 1) + 1);
     runs_.resize(static_cast<std::size_t>(nodes_.x()) * static_cast<std::size_t>(nodes_.y()) *
@@ -95,15 +144,14 @@ std::shared_ptr<const PackedLeaves::Row> PackedLeaves::pack(const SortedStrip& s
         if (block.leaf) {
             const auto& mask = block.leaf->getValueMask();
             for (openvdb::Index n = 0; n < 8; ++n) head.mask[n] = mask.getWord<std::uint64_t>(n);
-            openvdb::io::writeCompressedValues(out, block.leaf->buffer().data(), Leaf::SIZE, mask, Leaf::NodeMaskType(),
-                                               options_.half);
+            write_values(out, *block.leaf, options_, only_background_);
             const std::size_t end = static_cast<std::size_t>(out.tellp());
             head.bytes = static_cast<std::uint32_t>(end - written);
             written = end;
             ++row->leaves;
             if (options_.half) row->half_error.join(half_rounding_error(*block.leaf));
             row->active += mask.countOn();
-            block.leaf->evalActiveBoundingBox(row->box);
+            expand(row->box, block.origin, head.mask);
         } else if (block.tile == SortedBlock::Tile::kept) {
             row->active += leaf::size;
             row->box.expand(openvdb::CoordBBox::createCube(block.origin, leaf::dim));

@@ -60,6 +60,7 @@ class PackedLeaves {
 
     VdbWriteOptions options_;
     std::array<int, 3> order_;
+    bool only_background_;  // among the inactive values of leaves
     openvdb::Coord nodes_;                // nodes of 128³ voxels along x, y, z
     std::vector<std::vector<Run>> runs_;  // of each of them
     ByteStore store_;

@@ -372,8 +372,33 @@ bool StripSorter::nothing_stays(const Moments& m, const Coord& origin) const {
     return options_.threshold && (m.count == 0 || m.max <= lower_end());
 }
 
+/// mark_kept for a whole block and a threshold alone, eight samples at a time.
+bool StripSorter::mark_above(const Block& block, leaf::Leaf& leaf) const {
+    const __m128 low = _mm_set1_ps(lower_end()), highest = _mm_set1_ps(std::numeric_limits<float>::max()),
+                 background = _mm_set1_ps(unknown_background);
+    float* out = leaf.buffer().data();
+    const auto four = [&](int i) {  // NaN compares false with both
+        const __m128 v = _mm_load_ps(block.values + i);
+        const __m128 kept = _mm_and_ps(_mm_cmpgt_ps(v, low), _mm_cmple_ps(v, highest));
+        _mm_storeu_ps(out + i, _mm_or_ps(_mm_and_ps(kept, v), _mm_andnot_ps(kept, background)));
+        return static_cast<std::uint64_t>(_mm_movemask_ps(kept));
+    };
+    std::uint64_t any = 0;
+    for (int x = 0; x < leaf::dim; ++x) {
+        std::uint64_t word = 0;
+        for (int y = 0; y < leaf::dim; ++y) {
+            const int row = leaf::offset(x, y, 0);
+            word |= (four(row) | four(row + 4) << 4) << 8 * y;
+        }
+        leaf.getValueMask().getWord<std::uint64_t>(static_cast<openvdb::Index>(x)) = word;
+        any |= word;
+    }
+    return any != 0;
+}
+
 /// Marks what is kept of a block as active in result.leaf, and gives it its values; true where there is any.
 bool StripSorter::mark_kept(const Block& block, SortedBlock& result) const {
+    if (!keep_ && options_.threshold && !options_.band && block.whole()) return mark_above(block, *result.leaf);
     const float low = lower_end(), high = upper_end();
     const bool keep_all = !keep_ && !options_.threshold;
     const auto* chosen = keep_ ? keep_->probeConstLeaf(result.origin) : nullptr;

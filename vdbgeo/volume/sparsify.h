@@ -110,6 +110,7 @@ class StripSorter {
     void load(const Strip& strip, int column, Block& block) const;
     void decide(const Block& block, const Moments& moments, SortedBlock& result) const;
     bool mark_kept(const Block& block, SortedBlock& result) const;
+    bool mark_above(const Block& block, leaf::Leaf& leaf) const;
     RoundingError round(SortedBlock& block) const;
 
     Vec3i size_;

@@ -66,9 +66,9 @@ MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
     result.level_set = grid->getGridClass() == openvdb::GRID_LEVEL_SET;
     if (options.sparsify.threshold || options.threshold || options.sparsify.background || options.invert ||
         options.crop || options.bin > 1 || options.normalise != MapReadOptions::Normalise::none ||
-        options.needs_selection())
+        options.quantise || options.needs_selection())
         result.warnings.push_back(
-            "the grid of a VDB file is taken as it is: nothing was cropped, binned, inverted, scaled or dropped");
+            "the grid of a VDB file is taken as it is: nothing was cropped, binned, inverted, scaled, rounded or dropped");
     if (options.mrc.voxel_size_A || options.mrc.origin != OriginRule::automatic)
         result.warnings.push_back(
             "a VDB file lies where its transform says: neither voxel size nor origin was changed");

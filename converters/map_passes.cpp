@@ -29,6 +29,12 @@ bool wants_percentile(const MapReadOptions& o) {
                            o.threshold->kind == ThresholdRule::Kind::fraction);
 }
 
+void check_mask_size(const std::string& name, const Vec3i& mask, const Vec3i& map) {
+    if (mask != map)
+        throw InvalidInput(fmt::format("{}: the mask has {} x {} x {} samples, the map {} x {} x {}", name, mask[0],
+                                       mask[1], mask[2], map[0], map[1], map[2]));
+}
+
 /// Puts the active voxels of a sorted map into a mask.
 void add_voxels(const std::vector<SortedStrip>& strips, MaskTree& mask) {
     for (const SortedStrip& strip : strips)
@@ -140,6 +146,8 @@ MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
     positive.threshold = 0.f;
     if (is_vdb_file(options_.mask)) {
         const auto grid = read_vdb(options_.mask);
+        const Frame frame = map_from_grid(grid).frame;
+        if (frame.bounded()) check_mask_size(name, frame.size, size_);
         auto mask = std::make_shared<MaskTree>();
         for (auto it = grid->cbeginValueOn(); it; ++it) {
             if (!(*it > 0)) continue;
@@ -158,9 +166,8 @@ MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
     if (size == whole) {
         options.crop = options_.crop;
         options.bin = options_.bin;
-    } else if (size != size_) {
-        throw InvalidInput(fmt::format("{}: the mask has {} x {} x {} samples, the map {} x {} x {}", name, size[0],
-                                       size[1], size[2], whole[0], whole[1], whole[2]));
+    } else {
+        check_mask_size(name, size, size_);
     }
     MapPasses passes(options_.mask, options);
     return passes.voxels_above(positive, progress);

@@ -60,6 +60,7 @@ int bias_of(SampleType type) { return type == SampleType::uint16 ? 32768 : 0; }
 }  // namespace
 
 struct StripSource::State {
+    std::string name;
     MrcReader reader;
     const MrcLayout& layout = reader.layout();
     const bool swapped = reader.header().swapped;
@@ -74,11 +75,11 @@ struct StripSource::State {
     tbb::enumerable_thread_specific<Scratch> scratch;
 
     State(const std::filesystem::path& path, const MapReadOptions& options)
-        : reader(path, options.mrc), bin(options.bin), invert(options.invert) {
-        place(path, options);
+        : name(path.string()), reader(path, options.mrc), bin(options.bin), invert(options.invert) {
+        place(options);
     }
 
-    void place(const std::filesystem::path& path, const MapReadOptions& options);
+    void place(const MapReadOptions& options);
     void unpack(const MapReadOptions& options);
 
     int descriptor() const { return unpacked ? unpacked->descriptor() : reader.descriptor(); }
@@ -97,7 +98,7 @@ struct StripSource::State {
     void finish(float* values, std::size_t n) const;
 };
 
-void StripSource::State::place(const std::filesystem::path& path, const MapReadOptions& options) {
+void StripSource::State::place(const MapReadOptions& options) {
     const Frame& whole = reader.frame();
     const auto& order = reader.order();
     Vec3i begin = Vec3i::Zero(), size = whole.size;
@@ -108,12 +109,12 @@ void StripSource::State::place(const std::filesystem::path& path, const MapReadO
             const int end = options.crop->end[i].value_or(whole.size[a]);
             if (begin[a] >= end || end > whole.size[a])
                 throw InvalidInput(fmt::format("{}: the crop {}:{} along {} does not lie in the map, which has {} samples there",
-                                               path.string(), begin[a], end, "xyz"[a], whole.size[a]));
+                                               name, begin[a], end, "xyz"[a], whole.size[a]));
             size[a] = end - begin[a];
         }
         if (size[a] < bin)
-            throw InvalidInput(fmt::format("{}: {} samples along {} are too few to bin by {}", path.string(),
-                                           size[a], "xyz"[a], bin));
+            throw InvalidInput(fmt::format("{}: {} samples along {} are too few to bin by {}", name, size[a], "xyz"[a],
+                                           bin));
         if (size[a] % bin != 0)
             warnings.push_back(fmt::format("{} of {} samples along {} are left over by binning and left out",
                                            size[a] % bin, size[a], "xyz"[a]));
@@ -163,8 +164,8 @@ const unsigned char* StripSource::State::rows(const Bytes* slab, int slab_first,
     for (unsigned char* to = out; left > 0;) {
         const ssize_t got = ::pread(descriptor(), to, left, static_cast<off_t>(from));
         if (got < 0 && errno == EINTR) continue;
-        if (got < 0) throw IoError(fmt::format("reading the map failed: {}", std::strerror(errno)));
-        if (got == 0) throw IoError("the map became shorter while it was read");
+        if (got < 0) throw IoError(fmt::format("{}: reading failed: {}", name, std::strerror(errno)));
+        if (got == 0) throw IoError(name + ": became shorter while it was read");
         to += got;
         from += static_cast<std::uint64_t>(got);
         left -= static_cast<std::uint64_t>(got);

@@ -367,6 +367,10 @@ TEST_F(MapStream, MaskAloneKeepsEverythingInIt) {
     write_vdb({read_map(folder_ / "mask.mrc").map.grid}, folder_ / "mask.vdb");
     options.mask = folder_ / "mask.vdb";
     expect_map(read_map(file(bytes.str()), options).map, m);
+    MapReadOptions cut = options;
+    cut.crop.emplace();
+    cut.crop->begin[0] = 1;  // a grid cannot be cut like the map
+    EXPECT_THROW(read_map(file(bytes.str()), cut), InvalidInput);
     mask.size = {43, 37, 28};
     mask.values.resize(43 * 37 * 28);
     options.mask = file(mask.str(), "other.mrc");

@@ -1,6 +1,7 @@
 #include "converters/map_passes.h"
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 
@@ -118,8 +119,12 @@ void MapPasses::find_percentile(const Progress& progress) {
 }
 
 void MapPasses::check_memory(const MaskTree& mask) const {
-    const std::uint64_t needed = 2 * mask.leafCount() * mask_leaf_bytes;
-    if (needed > options_.memory_limit())
+    // Growing makes a second mask; every thread that searches for components has 16 MB of its own.
+    std::uint64_t needed = 2 * mask.leafCount() * mask_leaf_bytes;
+    if (options_.despeckle > 1)
+        needed += static_cast<std::uint64_t>(tbb::this_task_arena::max_concurrency()) * (16 << 20);
+    const std::uint64_t limit = options_.memory_limit(), rest = (std::uint64_t(48) << 20) + limit / 8;
+    if (needed + rest > limit)
         throw NumericalError(fmt::format(
             "{}: the mask of what is kept takes {} MB, more than the memory allowed; raise --threshold or --memory, or --bin",
             name_, needed >> 20));

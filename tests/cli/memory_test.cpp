@@ -41,12 +41,15 @@ TEST_F(Memory, ABudgetHoldsAndChangesNoByte) {
     const Ended binned = good({"convert", at("big.mrc"), at("half.mrc"), "--bin", "2", "--memory", "128M"});
     const Ended mask = vdbgeo({"convert", at("big.mrc"), at("never.vdb"), "--threshold", "0", "--despeckle", "5",
                                "--memory", "64M", "--quiet"});
+    const Ended selected = good({"convert", at("big.mrc"), at("selected.vdb"), "--threshold", "0", "--despeckle", "5",
+                                 "--halo", "1", "--memory", "192M", "--threads", "2"});
     EXPECT_LT(small.peak_bytes, 128u << 20);
     EXPECT_NE(small.out.find("went through a temporary file"), std::string::npos) << small.out;
     EXPECT_LT(large.peak_bytes, 2u << 30);
     EXPECT_EQ(large.out.find("temporary"), std::string::npos) << large.out;
     EXPECT_LT(back.peak_bytes, 128u << 20);  // slabs only
     EXPECT_LT(binned.peak_bytes, 128u << 20);
+    EXPECT_LT(selected.peak_bytes, 192u << 20);
     expect_error(mask, 5, at("big.mrc"), "--memory");  // told before the memory is gone
     EXPECT_TRUE(bytes("small.vdb") == bytes("large.vdb"));
     EXPECT_TRUE(bytes("back.mrc").substr(1024) == bytes("big.mrc").substr(1024));

@@ -65,8 +65,9 @@ float find_background(MapPasses& passes, const std::string& name, const Progress
     bool any = false;
     passes.sort(
         [](SortedStrip&& strip) {
-            std::pair<SortedStrip, bool> result;
-            result.second = !strip.blocks.empty();
+            std::pair<SortedStrip, bool> result{SortedStrip(), false};
+            for (const SortedBlock& block : strip.blocks)
+                if (block.leaf ? !block.leaf->isEmpty() : block.tile == SortedBlock::Tile::kept) result.second = true;
             strip.blocks.clear();
             result.first = std::move(strip);
             return result;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "converters/map_passes.h"
 #include "converters/streamed_grid.h"
@@ -132,9 +133,16 @@ MapFile stream_map(const fs::path& path, const MapReadOptions& options, const Vd
             leaves->add_slab(rows);
         },
         progress.part(before, 1));
-    if (vdb.half) naming_half(path, leaves->half_error());
+    const float background = totals.background(passes.sorter());
+    if (vdb.half) {
+        naming_half(path, leaves->half_error());
+        if (std::isinf(rounded_to_half(background)))
+            throw InvalidInput(fmt::format(
+                "{}: the background {} is too large for 16-bit floats; give another --background", path.string(),
+                background));
+    }
     DensityMap map;
-    map.grid = std::make_shared<StreamedGrid>(leaves, totals.background(passes.sorter()));
+    map.grid = std::make_shared<StreamedGrid>(leaves, background);
     map.frame = passes.source().frame();
     map.statistics = totals.statistics();
     store_frame(map);

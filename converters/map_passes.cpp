@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "converters/map_file.h"
 #include "converters/vdb_file.h"
@@ -16,8 +18,6 @@ namespace {
 
 using openvdb::Coord;
 using openvdb::MaskTree;
-
-constexpr std::uint64_t mask_leaf_bytes = sizeof(MaskTree::LeafNodeType) + 16;
 
 bool wants_statistics(const MapReadOptions& o) {
     return o.normalise != MapReadOptions::Normalise::none ||
@@ -67,8 +67,18 @@ int MapPasses::passes() const { return passes_before(options_) + last_; }
 
 void MapPasses::store_metadata(openvdb::MetaMap& meta) const {
     store_mrc_metadata(meta, source_.reader(), file_);
-    if (options_.bin == 1 && options_.normalise == MapReadOptions::Normalise::none && !options_.quantise) return;
-    meta.removeMeta("mrc_mode");  // whole numbers no longer
+    const MrcHeader& h = source_.reader().header();
+    const auto& first = source_.first();
+    openvdb::Vec3i start(h.nxstart + first[0], h.nystart + first[1], h.nzstart + first[2]);
+    if (options_.bin > 1) start = openvdb::Vec3i(0, 0, 0);  // counted in voxels that are no more
+    meta.removeMeta("mrc_nstart");
+    meta.insertMeta("mrc_nstart", openvdb::Vec3IMetadata(start));
+    const std::string& type = source_.reader().value_type();
+    const bool is_unsigned = type == "uint8" || type == "uint16" || type == "uint4";
+    if (options_.bin == 1 && options_.normalise == MapReadOptions::Normalise::none && !options_.quantise &&
+        !(options_.invert && is_unsigned))
+        return;
+    meta.removeMeta("mrc_mode");  // its whole numbers do not hold the values
     meta.insertMeta("mrc_mode", openvdb::Int32Metadata(2));
 }
 
@@ -116,17 +126,26 @@ void MapPasses::find_percentile(const Progress& progress) {
     }
     if (order.count() == 0) throw InvalidInput(name_ + ": the map has no finite sample to take a threshold from");
     sparsify_.threshold = order.value();
+    if (!percentile && rule.number == 1)  // all of them: the smallest too
+        sparsify_.threshold = std::nextafter(order.value(), -std::numeric_limits<float>::infinity());
 }
 
 void MapPasses::check_memory(const MaskTree& mask) const {
     // Growing makes a second mask; every thread that searches for components has 16 MB of its own.
-    std::uint64_t needed = 2 * mask.leafCount() * mask_leaf_bytes;
-    if (options_.despeckle > 1)
-        needed += static_cast<std::uint64_t>(tbb::this_task_arena::max_concurrency()) * (16 << 20);
+    std::uint64_t needed = 2 * mask.memUsage();
+    if (options_.despeckle > 1) {
+        std::uint64_t blocks = 1, voxels = 1;
+        for (int a = 0; a < 3; ++a) {
+            blocks *= static_cast<std::uint64_t>((size_[a] - 1) / 128 + 1);
+            voxels *= static_cast<std::uint64_t>(size_[a]);
+        }
+        needed += std::min(static_cast<std::uint64_t>(tbb::this_task_arena::max_concurrency()), blocks) *
+                  std::min<std::uint64_t>(16 << 20, 8 * voxels);
+    }
     const std::uint64_t limit = options_.memory_limit(), rest = (std::uint64_t(48) << 20) + limit / 8;
     if (needed + rest > limit)
         throw NumericalError(fmt::format(
-            "{}: the mask of what is kept takes {} MB, more than the memory allowed; raise --threshold or --memory, or --bin",
+            "{}: choosing what is kept takes {} MB, more than the memory allowed; raise --threshold or --memory, or --bin",
             name_, needed >> 20));
 }
 
@@ -147,6 +166,9 @@ MaskTree::Ptr MapPasses::voxels_above(const SparsifyOptions& what, const Progres
 /// Where the mask file is above 0.
 MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
     const std::string name = options_.mask.string();
+    std::error_code ignored;
+    if (std::filesystem::exists(options_.mask, ignored) && !std::filesystem::is_regular_file(options_.mask, ignored))
+        throw InvalidInput(name + ": a mask is read more than once, and a pipe cannot be: give it as a file");
     SparsifyOptions positive;
     positive.threshold = 0.f;
     if (is_vdb_file(options_.mask)) {
@@ -179,10 +201,12 @@ MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
 }
 
 void MapPasses::select(const Progress& progress) {
+    const openvdb::CoordBBox box(Coord(0), Coord(size_.x() - 1, size_.y() - 1, size_.z() - 1));
     MaskTree::Ptr mask;
     if (sparsify_.threshold) mask = voxels_above(sparsify_, progress.part(0, 0.6));
     if (!options_.mask.empty()) {
         const auto allowed = read_mask(progress.part(0.6, 0.8));
+        grow(*allowed, 0, box);  // a grid may reach beyond the map
         if (mask)
             mask->topologyIntersection(*allowed);
         else
@@ -191,9 +215,10 @@ void MapPasses::select(const Progress& progress) {
     if (options_.despeckle > 1) {
         despeckled_ = remove_small_components(*mask, options_.despeckle, progress.part(0.8, 0.9));
     }
-    const openvdb::CoordBBox box(Coord(0), Coord(size_.x() - 1, size_.y() - 1, size_.z() - 1));
-    grow(*mask, options_.halo, box);
-    check_memory(*mask);
+    for (int done = 0; done < options_.halo; done += 8) {  // in steps, to stop in time
+        grow(*mask, std::min(8, options_.halo - done), box);
+        check_memory(*mask);
+    }
     mask->prune();
     keep_ = mask;
 }

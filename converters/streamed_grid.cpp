@@ -154,6 +154,7 @@ std::shared_ptr<const PackedLeaves::Row> PackedLeaves::pack(const SortedStrip& s
             expand(row->box, block.origin, head.mask);
         } else if (block.tile == SortedBlock::Tile::kept) {
             row->active += leaf::size;
+            if (options_.half) row->half_error.join(half_rounding_error(block.tile_value, block.origin));
             row->box.expand(openvdb::CoordBBox::createCube(block.origin, leaf::dim));
         }
         row->parts.back().heads.push_back(head);

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -70,6 +71,8 @@ struct StripSource::State {
     std::array<int, 3> first{}, count{};  // along columns, rows, sections: where the crop begins; samples handed out
     Frame frame;
     std::vector<std::string> warnings;
+    bool unpack_first = false;
+    std::filesystem::path unpack_to;
     std::optional<ScratchFile> unpacked;
     std::uint64_t unpacked_bytes = 0;
     tbb::enumerable_thread_specific<Scratch> scratch;
@@ -80,7 +83,7 @@ struct StripSource::State {
     }
 
     void place(const MapReadOptions& options);
-    void unpack(const MapReadOptions& options);
+    void unpack(const Progress& progress);
 
     int descriptor() const { return unpacked ? unpacked->descriptor() : reader.descriptor(); }
     bool in_any_order() const { return descriptor() >= 0; }
@@ -131,8 +134,8 @@ void StripSource::State::place(const MapReadOptions& options) {
     }
 }
 
-void StripSource::State::unpack(const MapReadOptions& options) {
-    unpacked.emplace(options.scratch.empty() ? std::filesystem::temp_directory_path() : options.scratch);
+void StripSource::State::unpack(const Progress& progress) {
+    unpacked.emplace(unpack_to.empty() ? std::filesystem::temp_directory_path() : unpack_to);
     const std::uint64_t piece = std::max<std::uint64_t>(1, (std::uint64_t(8) << 20) / layout.section_bytes);
     Bytes bytes;
     while (reader.sections_left() > 0) {
@@ -141,6 +144,7 @@ void StripSource::State::unpack(const MapReadOptions& options) {
         reader.read_raw_sections(bytes.data(), n);
         unpacked->append(bytes.data(), bytes.size());
         unpacked_bytes += bytes.size();
+        progress.report(1 - static_cast<double>(reader.sections_left()) / layout.sections);
     }
 }
 
@@ -281,13 +285,15 @@ StripSource::StripSource(const std::filesystem::path& path, const MapReadOptions
     : state_(std::make_unique<State>(path, options)) {
     State& s = *state_;
     const std::uint64_t slab = s.layout.section_bytes * static_cast<std::uint64_t>(leaf::dim * s.bin);
-    if (!s.in_any_order() && (passes > 1 || 2 * slab > options.memory_limit() / 4)) s.unpack(options);
+    s.unpack_first = !s.in_any_order() && (passes > 1 || 2 * slab > options.memory_limit() / 4);
+    s.unpack_to = options.scratch;
 }
 
 StripSource::~StripSource() = default;
 
 const MrcReader& StripSource::reader() const { return state_->reader; }
 const Frame& StripSource::frame() const { return state_->frame; }
+const std::array<int, 3>& StripSource::first() const { return state_->first; }
 const std::array<int, 3>& StripSource::order() const { return state_->reader.order(); }
 std::uint64_t StripSource::unpacked() const { return state_->unpacked_bytes; }
 
@@ -303,9 +309,12 @@ void StripSource::scale(double shift, double factor) {
     state_->scaled = true;
 }
 
-void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, const Progress& progress,
-                       int height, int group) {
+void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, const Progress& whole, int height,
+                       int group) {
     State& s = *state_;
+    const bool unpack = s.unpack_first && !s.unpacked;
+    if (unpack) s.unpack(whole.part(0, 0.7));
+    const Progress progress = whole.part(unpack ? 0.7 : 0, 1);
     const int sections = s.count[2], slabs = (sections - 1) / height + 1, strips = (s.count[1] - 1) / leaf::dim + 1;
     if (group <= 0) group = strips;
     const bool any_order = s.in_any_order();
@@ -329,9 +338,13 @@ void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, c
             begin(here);
             parallel_for(here, 1, [&](std::size_t i) {
                 const int row = first + static_cast<int>(i), rows = std::min(leaf::dim, s.count[1] - row * leaf::dim);
-                visit(s.strip(bytes, first_of(slab), slab * height, sections_of(slab), row * leaf::dim, rows,
-                              s.scratch.local()),
-                      slab, row, i);
+                // Isolated: a loop inside `visit` must not have this thread take up another strip, for which
+                // it has only one scratch.
+                tbb::this_task_arena::isolate([&] {
+                    visit(s.strip(bytes, first_of(slab), slab * height, sections_of(slab), row * leaf::dim, rows,
+                                  s.scratch.local()),
+                          slab, row, i);
+                });
             });
             end();
         }

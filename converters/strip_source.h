@@ -29,6 +29,8 @@ class StripSource {
     /// Of the samples handed out: after crop and bin.
     const Frame& frame() const;
     const std::array<int, 3>& order() const;
+    /// Column, row and section of the file at which the crop begins.
+    const std::array<int, 3>& first() const;
     /// What was done beyond reading, and what is odd about the file: one line each.
     std::vector<std::string> warnings() const;
     /// Bytes that went to a temporary file; 0: none.

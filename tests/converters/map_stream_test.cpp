@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -235,7 +236,7 @@ TEST_F(MapStream, ConstantBlocksBecomeTiles) {
         for (int y = 0; y < 37; ++y)
             for (int x = 0; x < 43; ++x)
                 bytes.values[m.at(x, y, z)] = x < 24 && y < 24 && z < 24 ? 500 : x < 32 && z < 16 ? -3 : 40;
-    MapReadOptions band = above(450);
+    MapReadOptions band = above(30);  // 40 is kept, 500 lies above
     band.sparsify.band = 20.f;
     const DensityMap map = read_map(file(bytes.str()), above(100)).map;
     EXPECT_EQ(map.grid->tree().leafCount(), 0u);
@@ -314,6 +315,9 @@ TEST_F(MapStream, PercentileAndFractionKeepWhatTheySay) {
     const MrcBytes bytes = noise_map();
     const auto path = file(bytes.str());
     const double n = static_cast<double>(bytes.values.size());
+    MapReadOptions all;
+    all.threshold = ThresholdRule{ThresholdRule::Kind::fraction, 1};
+    EXPECT_EQ(read_map(path, all).map.grid->activeVoxelCount(), bytes.values.size());
     for (const double percent : {0.0, 10.0, 50.0, 99.0}) {
         MapReadOptions options;
         options.threshold = ThresholdRule{ThresholdRule::Kind::percentile, percent};
@@ -425,4 +429,83 @@ TEST_F(MapStream, LeavesOfSeveralNodesAreStoredInTheOrderOfTheTree) {
         for (const float v : test::noise(static_cast<std::size_t>(size[0] * size[1] * size[2]), 3)) bytes.values.push_back(v);
         expect_same_files(bytes, above(0.8f));
     }
+}
+
+TEST_F(MapStream, TilesAndBackgroundAreHeldAgainstTheRangeOfHalvesToo) {
+    MrcBytes bytes = noise_map();
+    const Model m = model_of(bytes);
+    m.each([&](int x, int y, int z) { bytes.values[m.at(x, y, z)] = x < 8 && y < 8 && z < 8 ? 1e6 : x * 0.5; });
+    VdbWriteOptions halves;
+    halves.half = true;
+    EXPECT_THROW(stream_map(file(bytes.str()), {}, halves), InvalidInput);
+    for (double& v : bytes.values) v = v > 20 ? v : -1e6;
+    EXPECT_THROW(stream_map(file(bytes.str()), above(0), halves), InvalidInput);
+}
+
+TEST_F(MapStream, PercentilesOfVeryWideMapsAreExact) {
+    MrcBytes bytes;
+    bytes.size = {9001, 20, 17};
+    for (const float v : test::noise(9001 * 20 * 17, 13)) bytes.values.push_back(v);
+    std::vector<double> sorted = bytes.values;
+    std::sort(sorted.begin(), sorted.end());
+    const auto path = file(bytes.str());
+    for (const double percent : {55.0, 95.0}) {
+        MapReadOptions options;
+        options.threshold = ThresholdRule{ThresholdRule::Kind::percentile, percent};
+        const double level = sorted[static_cast<std::size_t>(std::ceil(percent * double(sorted.size()) / 100)) - 1];
+        const auto kept = static_cast<std::uint64_t>(
+            sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), level));
+        EXPECT_EQ(read_map(path, options).map.grid->activeVoxelCount(), kept);
+    }
+}
+
+TEST_F(MapStream, TheStartOfACropIsCountedFromTheFilesOwn) {
+    MrcBytes bytes = noise_map(2, {3, 1, 2});
+    bytes.origin = {0, 0, 0};
+    bytes.start = {-10, 20, 5};
+    const auto path = file(bytes.str());
+    MapReadOptions options;
+    options.crop.emplace();
+    options.crop->begin = {1, 2, 3};
+    copy_map(path, folder_ / "crop.mrc", options, {});
+    const MrcReader cropped(folder_ / "crop.mrc");
+    EXPECT_EQ(cropped.origin_rule(), "nstart");
+    EXPECT_EQ(cropped.header().nxstart, -10 + 3);  // columns run along z, rows along x, sections along y
+    EXPECT_EQ(cropped.header().nystart, 20 + 1);
+    EXPECT_EQ(cropped.header().nzstart, 5 + 2);
+    EXPECT_TRUE(cropped.frame().origin.isApprox(read_map(path, options).map.frame.origin, 1e-6));
+    options.bin = 2;
+    copy_map(path, folder_ / "bin.mrc", options, {});
+    const MrcReader reader(folder_ / "bin.mrc");
+    EXPECT_EQ(reader.header().nxstart, 0);
+    EXPECT_TRUE(reader.frame().origin.isApprox(read_map(path, options).map.frame.origin, 1e-6));
+}
+
+TEST_F(MapStream, InvertedUnsignedNumbersAreWrittenAsFloats) {
+    const auto path = file(noise_map(6).str());
+    MapReadOptions options;
+    options.invert = true;
+    EXPECT_EQ(copy_map(path, folder_ / "i.mrc", options, {}).report.mode, 2);
+    EXPECT_EQ(copy_map(file(noise_map(1).str()), folder_ / "s.mrc", options, {}).report.mode, 1);
+}
+
+TEST_F(MapStream, NoNumberBlocksDoNotHideTheErrorOfRounding) {
+    MrcBytes bytes = noise_map();
+    const Model m = model_of(bytes);
+    m.each([&](int x, int y, int z) {
+        if (x < 8 && y < 8 && z < 8) bytes.values[m.at(x, y, z)] = NAN;
+    });
+    MapReadOptions options;
+    options.quantise = ThresholdRule{ThresholdRule::Kind::value, 0.25};
+    const MapFile in = read_map(file(bytes.str()), options);
+    EXPECT_GT(in.rounding.largest, 0.12);
+    EXPECT_LE(in.rounding.largest, 0.125);
+}
+
+TEST_F(MapStream, ABandThatKeepsNothingKeepsNothingEitherWay) {
+    MapReadOptions band = above(-50);
+    band.sparsify.band = 1.f;
+    const auto path = file(noise_map().str());
+    EXPECT_EQ(stream_map(path, band, {}).map.grid->activeVoxelCount(), 0u);
+    EXPECT_THROW(copy_map(path, folder_ / "never.mrc", band, {}), NumericalError);
 }

@@ -118,7 +118,9 @@ struct OrderStatistic::State {
         for (std::size_t b = first_finite; b < end_finite; ++b) count += sum[b];
         done = count == 0;
         if (done) return;
-        const double wanted = std::ceil(fraction * static_cast<double>(count)) - 1;
+        // A fraction such as 0.55 is rounded, and may come out just above the whole number that is meant.
+        const double n = static_cast<double>(count), exact = fraction * n, whole = std::round(exact);
+        const double wanted = (std::abs(exact - whole) <= 1e-15 * n ? whole : std::ceil(exact)) - 1;
         rank = wanted > 0 ? std::min(static_cast<std::uint64_t>(wanted), count - 1) : 0;
         chosen = find(sum, first_finite);
         in_chosen = sum[chosen];

@@ -166,6 +166,16 @@ RoundingError half_rounding_error(const openvdb::FloatGrid& grid) {
     return error;
 }
 
+RoundingError half_rounding_error(float value, const openvdb::Coord& at) {
+    RoundingError error;
+    if (!std::isfinite(value) || value == 0) return error;
+    error.largest = std::abs(double(rounded_to_half(value)) - value);
+    error.largest_relative = error.largest / std::abs(double(value));
+    error.at = at;
+    error.value = value;
+    return error;
+}
+
 void check_half_range(const RoundingError& half_error) {
     if (std::isfinite(half_error.largest)) return;
     throw InvalidInput(

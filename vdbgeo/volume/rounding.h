@@ -27,6 +27,9 @@ RoundingError half_rounding_error(const openvdb::FloatGrid& grid);
 /// The same for one leaf: for a writer that has no whole grid.
 RoundingError half_rounding_error(const openvdb::FloatTree::LeafNodeType& leaf);
 
+/// The same for one value, at `at`.
+RoundingError half_rounding_error(float value, const openvdb::Coord& at);
+
 /// Throws InvalidInput, naming the voxel and its value, where a finite value has no finite 16-bit float.
 void check_half_range(const RoundingError& half_error);
 void check_half_range(const openvdb::FloatGrid& grid);

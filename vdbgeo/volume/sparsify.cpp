@@ -451,7 +451,7 @@ void StripSorter::decide(const Block& block, const Moments& m, SortedBlock& resu
 RoundingError StripSorter::round(SortedBlock& block) const {
     if (block.leaf) return quantise(*block.leaf, *options_.quantisation);
     RoundingError error;
-    if (block.tile != SortedBlock::Tile::kept) return error;
+    if (block.tile != SortedBlock::Tile::kept || !std::isfinite(block.tile_value)) return error;
     const float rounded = quantise(block.tile_value, *options_.quantisation);
     error.largest = std::abs(double(rounded) - block.tile_value);
     if (block.tile_value != 0) error.largest_relative = error.largest / std::abs(double(block.tile_value));

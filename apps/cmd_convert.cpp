@@ -65,8 +65,8 @@ void need_active(const std::string& file, const DensityMap& map) {
 /// Reads the map or grid and says what is odd about it.
 MapFile read_for(const ConvertOptions& o, bool stream, Session& session) {
     const auto progress = session.stage("reading");
-    MapFile in = stream ? stream_map(o.in, o.map.options, o.vdb, progress)
-                        : read_map(o.in, o.map.options, progress);
+    MapFile in =
+        stream ? stream_map(o.in, o.map.options, o.vdb, progress) : read_map(o.in, o.map.options, progress);
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     need_active(o.in, in.map);
     if (!session.json && !session.quiet)
@@ -81,8 +81,8 @@ Json result_of(const ConvertOptions& o, const MapFile& in) {
 /// One line on a grid that was written as it is.
 void say_size(const std::string& out, const Json& grid, Session& session) {
     if (session.json || session.quiet) return;
-    session.say(fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB", out,
-                            grid["active_voxels"].dump(), grid["bytes_in_memory"].get<double>() / 1e6,
+    session.say(fmt::format("{}: {} active voxels, {:.1f} MB in memory where the dense map takes {:.1f} MB",
+                            out, grid["active_voxels"].dump(), grid["bytes_in_memory"].get<double>() / 1e6,
                             grid["dense_bytes"].get<double>() / 1e6));
 }
 
@@ -100,8 +100,9 @@ Json convert_loaded(const ConvertOptions& o, SceneLevels& levels, Session& sessi
         j.update(scene_json(grids, o.scene, levels));
         if (!session.json && !session.quiet)
             for (const Json& grid : j["grids"])
-                session.say(fmt::format("{}: {} ({}), {} active voxels", o.out, grid["name"].get<std::string>(),
-                                        grid["class"].get<std::string>(), grid["active_voxels"].dump()));
+                session.say(fmt::format("{}: {} ({}), {} active voxels", o.out,
+                                        grid["name"].get<std::string>(), grid["class"].get<std::string>(),
+                                        grid["active_voxels"].dump()));
     } else {
         if (o.vdb.half && is_vdb_ending(o.out)) {
             in.half_error = half_rounding_error(*in.map.grid);
@@ -209,7 +210,8 @@ Command convert_command() {
                 app.add_option(
                        "files", o->files,
                        "Map, grid or mesh file (- reads a map from a pipe), and last the file to write: "
-                       ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; .ply .obj .off .stl; - is an MRC map for a "
+                       ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; .ply .obj .off .stl; - is an MRC "
+                       "map for a "
                        "pipe. Several maps make a series: OUT_0001.vdb and so on")
                     ->required()
                     ->expected(2, -1)

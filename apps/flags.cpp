@@ -12,7 +12,8 @@ namespace {
 Crop parse_crop(const std::string& text) {
     Crop crop;
     const auto fail = [&] {
-        return UsageError(fmt::format("--crop: '{}' is not x0:x1,y0:y1,z0:z1 in voxels, where numbers may be left out", text));
+        return UsageError(fmt::format(
+            "--crop: '{}' is not x0:x1,y0:y1,z0:z1 in voxels, where numbers may be left out", text));
     };
     const auto number = [&](const std::string& word) -> std::optional<int> {
         int value = 0;
@@ -76,7 +77,8 @@ void MapFlags::add_reading(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--volume", options.mrc.volume, "Which volume of a stack of volumes, from 0")
         ->capture_default_str();
-    app.add_option("--crop", crop, "Part of the map: x0:x1,y0:y1,z0:z1 in voxels from 0, ends not included [all]");
+    app.add_option("--crop", crop,
+                   "Part of the map: x0:x1,y0:y1,z0:z1 in voxels from 0, ends not included [all]");
     app.add_option("--bin", options.bin, "Take the mean of N x N x N voxels as one")->capture_default_str();
     app.add_flag("--invert", options.invert,
                  "Negate the samples: for raw tomograms, where what is dense is dark");
@@ -92,26 +94,31 @@ void MapFlags::add_reading(CLI::App& app) {
 }
 
 void MapFlags::add_sparsify(CLI::App& app) {
-    app.add_option(
-        "--threshold", threshold,
-        "Keep samples above this density, in the map's units, as Nsigma (mean + N rms) or as N% (percentile) [keep all]");
-    app.add_option("--keep-fraction", keep_fraction, "Keep this part of the samples, the densest, from 0 to 1");
+    app.add_option("--threshold", threshold,
+                   "Keep samples above this density, in the map's units, as Nsigma (mean + N rms) or as N% "
+                   "(percentile) [keep all]");
+    app.add_option("--keep-fraction", keep_fraction,
+                   "Keep this part of the samples, the densest, from 0 to 1");
     app.add_option("--band", options.sparsify.band,
                    "Keep samples within this distance of the threshold, in the map's units [no band]");
     app.add_option(
         "--background", options.sparsify.background,
         "Density of what was dropped, in the map's units [the solvent level: median at the border]");
-    app.add_option("--mask", options.mask, "Keep samples only where this map or VDB file is above 0 [everywhere]");
+    app.add_option("--mask", options.mask,
+                   "Keep samples only where this map or VDB file is above 0 [everywhere]");
     app.add_option("--despeckle", options.despeckle,
                    "Drop connected pieces of fewer voxels than this, after --threshold and --mask [0]");
-    app.add_option("--quantise", quantise,
-                   "Round what is kept to multiples of a power of two up to this, in the map's units or as Nsigma: "
-                   "smaller files [no]");
-    app.add_option("--halo", options.halo, "Keep this many voxels around what is kept, after --despeckle [0]");
+    app.add_option(
+        "--quantise", quantise,
+        "Round what is kept to multiples of a power of two up to this, in the map's units or as Nsigma: "
+        "smaller files [no]");
+    app.add_option("--halo", options.halo,
+                   "Keep this many voxels around what is kept, after --despeckle [0]");
 }
 
 void MapFlags::add_memory(CLI::App& app) {
-    app.add_option("--memory", memory, "Memory that may be taken, such as 2G or 512M [half of the machine's]");
+    app.add_option("--memory", memory,
+                   "Memory that may be taken, such as 2G or 512M [half of the machine's]");
 }
 
 void MapFlags::finish() {

@@ -1,11 +1,11 @@
 #include "apps/reports.h"
-#include "converters/streamed_grid.h"
 
 #include <Eigen/Core>
 #include <fmt/format.h>
 #include <tbb/version.h>
 
 #include "apps/build_info.h"
+#include "converters/streamed_grid.h"
 
 namespace vdbgeo::app {
 namespace {

@@ -38,8 +38,8 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
 /// For a command that writes a file to standard output; UsageError with --json, which wants it too.
 void take_output(Session& session);
 
-/// UsageError unless a map can be written under this name: .vdb, .nvdb, the endings of map files, plain or with
-/// .gz, or "-", which is an MRC file on standard output.
+/// UsageError unless a map can be written under this name: .vdb, .nvdb, the endings of map files, plain or
+/// with .gz, or "-", which is an MRC file on standard output.
 void check_map_output(const std::string& path, Session& session);
 
 /// Writes a map in the format that the name tells; what there is to say of an MRC file comes back.

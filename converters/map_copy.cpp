@@ -67,7 +67,8 @@ float find_background(MapPasses& passes, const std::string& name, const Progress
         [](SortedStrip&& strip) {
             std::pair<SortedStrip, bool> result{SortedStrip(), false};
             for (const SortedBlock& block : strip.blocks)
-                if (block.leaf ? !block.leaf->isEmpty() : block.tile == SortedBlock::Tile::kept) result.second = true;
+                if (block.leaf ? !block.leaf->isEmpty() : block.tile == SortedBlock::Tile::kept)
+                    result.second = true;
             strip.blocks.clear();
             result.first = std::move(strip);
             return result;
@@ -81,17 +82,19 @@ float find_background(MapPasses& passes, const std::string& name, const Progress
         progress);
     const Statistics s = totals.statistics();
     if (!any)
-        throw NumericalError(
-            fmt::format("{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
-                        name, s.min, s.max));
+        throw NumericalError(fmt::format(
+            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold", name,
+            s.min, s.max));
     return totals.background(passes.sorter());
 }
 
 /// One pass of all sections through the sink.
-void write_pass(MapPasses& passes, const Filter& filter, MrcSink& sink, int height, const Progress& progress) {
+void write_pass(MapPasses& passes, const Filter& filter, MrcSink& sink, int height,
+                const Progress& progress) {
     const auto& order = passes.sorter().order();
     const Vec3i& size = passes.sorter().size();
-    const std::size_t columns = static_cast<std::size_t>(size[order[0]]), rows = static_cast<std::size_t>(size[order[1]]);
+    const std::size_t columns = static_cast<std::size_t>(size[order[0]]),
+                      rows = static_cast<std::size_t>(size[order[1]]);
     Array<float> slab(columns * rows * static_cast<std::size_t>(height));
     int count = 0;
     passes.source().pass(
@@ -114,8 +117,8 @@ void write_pass(MapPasses& passes, const Filter& filter, MrcSink& sink, int heig
 
 }  // namespace
 
-MapCopy copy_map(const fs::path& in, const fs::path& out, const MapReadOptions& read, const MrcWriteOptions& write,
-                 const Progress& progress) {
+MapCopy copy_map(const fs::path& in, const fs::path& out, const MapReadOptions& read,
+                 const MrcWriteOptions& write, const Progress& progress) {
     read.check();
     write.check();
     const int last = last_passes(out, read, write);

@@ -69,7 +69,8 @@ MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
         options.crop || options.bin > 1 || options.normalise != MapReadOptions::Normalise::none ||
         options.quantise || options.needs_selection())
         result.warnings.push_back(
-            "the grid of a VDB file is taken as it is: nothing was cropped, binned, inverted, scaled, rounded or dropped");
+            "the grid of a VDB file is taken as it is: nothing was cropped, binned, inverted, scaled, "
+            "rounded or dropped");
     if (options.mrc.voxel_size_A || options.mrc.origin != OriginRule::automatic)
         result.warnings.push_back(
             "a VDB file lies where its transform says: neither voxel size nor origin was changed");
@@ -137,9 +138,9 @@ MapFile stream_map(const fs::path& path, const MapReadOptions& options, const Vd
     if (vdb.half) {
         naming_half(path, leaves->half_error());
         if (std::isinf(rounded_to_half(background)))
-            throw InvalidInput(fmt::format(
-                "{}: the background {} is too large for 16-bit floats; give another --background", path.string(),
-                background));
+            throw InvalidInput(
+                fmt::format("{}: the background {} is too large for 16-bit floats; give another --background",
+                            path.string(), background));
     }
     DensityMap map;
     map.grid = std::make_shared<StreamedGrid>(leaves, background);

@@ -54,8 +54,8 @@ struct MapReadOptions {
     SparsifyOptions sparsify;
     /// A threshold that takes a pass of its own, in place of sparsify.threshold.
     std::optional<ThresholdRule> threshold;
-    /// A map file of the same size (before crop and bin, or after), or a grid in a VDB file (after): only samples
-    /// where it is above 0 are kept.
+    /// A map file of the same size (before crop and bin, or after), or a grid in a VDB file (after): only
+    /// samples where it is above 0 are kept.
     std::filesystem::path mask;
     /// Drop face-connected pieces of fewer kept voxels than this. 0: none.
     std::uint64_t despeckle = 0;

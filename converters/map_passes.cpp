@@ -32,8 +32,8 @@ bool wants_percentile(const MapReadOptions& o) {
 
 void check_mask_size(const std::string& name, const Vec3i& mask, const Vec3i& map) {
     if (mask != map)
-        throw InvalidInput(fmt::format("{}: the mask has {} x {} x {} samples, the map {} x {} x {}", name, mask[0],
-                                       mask[1], mask[2], map[0], map[1], map[2]));
+        throw InvalidInput(fmt::format("{}: the mask has {} x {} x {} samples, the map {} x {} x {}", name,
+                                       mask[0], mask[1], mask[2], map[0], map[1], map[2]));
 }
 
 /// Puts the active voxels of a sorted map into a mask.
@@ -97,7 +97,8 @@ std::vector<std::string> MapPasses::notes() const {
 /// Strips that are packed at a time.
 int MapPasses::group() const {
     const auto& order = source_.order();
-    const std::uint64_t strip = std::uint64_t(4) * leaf::dim * leaf::dim * static_cast<std::uint64_t>(size_[order[0]]);
+    const std::uint64_t strip =
+        std::uint64_t(4) * leaf::dim * leaf::dim * static_cast<std::uint64_t>(size_[order[0]]);
     const std::uint64_t fit = options_.memory_limit() / 8 / strip;
     return static_cast<int>(std::min<std::uint64_t>(std::max<std::uint64_t>(fit / 16 * 16, 16), 1 << 20));
 }
@@ -124,7 +125,8 @@ void MapPasses::find_percentile(const Progress& progress) {
             [](std::size_t) {}, [] {}, progress.part(0.5 * pass, 0.5 * (pass + 1)));
         order.end_pass();
     }
-    if (order.count() == 0) throw InvalidInput(name_ + ": the map has no finite sample to take a threshold from");
+    if (order.count() == 0)
+        throw InvalidInput(name_ + ": the map has no finite sample to take a threshold from");
     sparsify_.threshold = order.value();
     if (!percentile && rule.number == 1)  // all of them: the smallest too
         sparsify_.threshold = std::nextafter(order.value(), -std::numeric_limits<float>::infinity());
@@ -144,9 +146,10 @@ void MapPasses::check_memory(const MaskTree& mask) const {
     }
     const std::uint64_t limit = options_.memory_limit(), rest = (std::uint64_t(48) << 20) + limit / 8;
     if (needed + rest > limit)
-        throw NumericalError(fmt::format(
-            "{}: choosing what is kept takes {} MB, more than the memory allowed; raise --threshold or --memory, or --bin",
-            name_, needed >> 20));
+        throw NumericalError(
+            fmt::format("{}: choosing what is kept takes {} MB, more than the memory allowed; raise "
+                        "--threshold or --memory, or --bin",
+                        name_, needed >> 20));
 }
 
 MaskTree::Ptr MapPasses::voxels_above(const SparsifyOptions& what, const Progress& progress) {
@@ -167,7 +170,8 @@ MaskTree::Ptr MapPasses::voxels_above(const SparsifyOptions& what, const Progres
 MaskTree::Ptr MapPasses::read_mask(const Progress& progress) const {
     const std::string name = options_.mask.string();
     std::error_code ignored;
-    if (std::filesystem::exists(options_.mask, ignored) && !std::filesystem::is_regular_file(options_.mask, ignored))
+    if (std::filesystem::exists(options_.mask, ignored) &&
+        !std::filesystem::is_regular_file(options_.mask, ignored))
         throw InvalidInput(name + ": a mask is read more than once, and a pipe cannot be: give it as a file");
     SparsifyOptions positive;
     positive.threshold = 0.f;
@@ -238,7 +242,8 @@ void MapPasses::prepare(const Progress& progress) {
         const bool sigma = options_.normalise == MapReadOptions::Normalise::sigma;
         if (options_.normalise != MapReadOptions::Normalise::none) {
             const double shift = sigma ? s.mean : s.min, spread = sigma ? s.rms : s.max - s.min;
-            if (!(spread > 0)) throw InvalidInput(name_ + ": all samples are equal: they cannot be normalised");
+            if (!(spread > 0))
+                throw InvalidInput(name_ + ": all samples are equal: they cannot be normalised");
             source_.scale(shift, 1 / spread);
             for (double* v : {&s.min, &s.max, &s.mean}) *v = (*v - shift) / spread;
             s.rms /= spread;
@@ -251,7 +256,8 @@ void MapPasses::prepare(const Progress& progress) {
     if (wants_percentile(options_)) find_percentile(next(2));
     if (options_.quantise) {
         const bool sigma = options_.quantise->kind == ThresholdRule::Kind::sigma;
-        sparsify_.quantisation = quantisation_step(options_.quantise->number * (sigma ? statistics_->rms : 1));
+        sparsify_.quantisation =
+            quantisation_step(options_.quantise->number * (sigma ? statistics_->rms : 1));
     }
     sparsify_.check();
     if (options_.needs_selection()) select(next(1));
@@ -264,7 +270,8 @@ std::string MapPasses::history() const {
     if (o.crop) {
         std::string ranges;
         for (std::size_t a = 0; a < 3; ++a)
-            ranges += fmt::format("{}{}:{}", a ? "," : "", o.crop->begin[a] ? std::to_string(*o.crop->begin[a]) : "",
+            ranges += fmt::format("{}{}:{}", a ? "," : "",
+                                  o.crop->begin[a] ? std::to_string(*o.crop->begin[a]) : "",
                                   o.crop->end[a] ? std::to_string(*o.crop->end[a]) : "");
         line += " cropped " + ranges;
     }

@@ -1,4 +1,5 @@
-// A map file gone through as often as its options ask for: statistics, percentile, choice of samples, samples.
+// A map file gone through as often as its options ask for: statistics, percentile, choice of samples,
+// samples.
 #pragma once
 
 #include "converters/strip_source.h"

@@ -117,7 +117,8 @@ class MrcReader {
     const MrcLayout& layout() const;
     /// Reads the bytes of the next `count` sections into `out`, or passes over them where that is null.
     void read_raw_sections(void* out, int count);
-    /// Descriptor of a plain file, in which sections can be read in any order from layout().data_start on; else -1.
+    /// Descriptor of a plain file, in which sections can be read in any order from layout().data_start on;
+    /// else -1.
     int descriptor() const;
     /// Bytes that the file holds unpacked come from "gzip", "bzip2" or "zstd"; empty for a plain file.
     const std::string& compression() const;

@@ -34,8 +34,8 @@ std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
 SampleType stored_type(const MrcHeader& h, const MrcReadOptions& options) {
     using Mode0 = MrcReadOptions::Mode0;
     const bool imod_unsigned = h.imod_stamp == imod_stamp_value && (h.imod_flags & 1) == 0;
-    return sample_type(h.mode, options.mode0 == Mode0::as_unsigned ||
-                                   (options.mode0 == Mode0::automatic && imod_unsigned));
+    return sample_type(
+        h.mode, options.mode0 == Mode0::as_unsigned || (options.mode0 == Mode0::automatic && imod_unsigned));
 }
 
 /// Works the layout out, step by step; each step may warn.

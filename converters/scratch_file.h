@@ -10,8 +10,8 @@
 
 namespace vdbgeo {
 
-/// A file without a name in `folder`, gone when it is closed, however the process ends. Bytes are added at its
-/// end and read anywhere. Throws IoError naming the folder, where the disk is full too.
+/// A file without a name in `folder`, gone when it is closed, however the process ends. Bytes are added at
+/// its end and read anywhere. Throws IoError naming the folder, where the disk is full too.
 class ScratchFile {
  public:
     explicit ScratchFile(const std::filesystem::path& folder);

@@ -7,13 +7,13 @@
 
 namespace vdbgeo {
 
-/// A grid of floats that write_vdb hands to OpenVDB's archive as it is: neither copied nor wrapped, whatever the
-/// options say of half floats.
+/// A grid of floats that write_vdb hands to OpenVDB's archive as it is: neither copied nor wrapped, whatever
+/// the options say of half floats.
 ///
-/// The archive copies a grid to add counts to its metadata before they are written, and to add notes for delayed
-/// loading, for which it compresses every leaf once more: half the time of writing. It does not do so for types
-/// that it does not know. So from the copy to the nodes such a grid goes by another name; by then its own stands
-/// in the file. Files without these notes are read by all.
+/// The archive copies a grid to add counts to its metadata before they are written, and to add notes for
+/// delayed loading, for which it compresses every leaf once more: half the time of writing. It does not do so
+/// for types that it does not know. So from the copy to the nodes such a grid goes by another name; by then
+/// its own stands in the file. Files without these notes are read by all.
 class SelfWritingGrid : public openvdb::FloatGrid {
  public:
     using openvdb::FloatGrid::FloatGrid;
@@ -41,7 +41,9 @@ class SelfWritingGrid : public openvdb::FloatGrid {
             static_cast<openvdb::MetaMap&>(*this) = grid;
         }
         openvdb::Index64 activeVoxelCount() const override { return grid_.activeVoxelCount(); }
-        openvdb::CoordBBox evalActiveVoxelBoundingBox() const override { return grid_.evalActiveVoxelBoundingBox(); }
+        openvdb::CoordBBox evalActiveVoxelBoundingBox() const override {
+            return grid_.evalActiveVoxelBoundingBox();
+        }
         openvdb::Index64 memUsage() const override { return grid_.memUsage(); }
 
      private:

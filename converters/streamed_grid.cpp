@@ -22,7 +22,8 @@ constexpr int node_of(int voxel) { return voxel >> lower_bits; }
 
 /// Number of a leaf's place in its lower node.
 std::uint16_t slot_of(const Coord& origin) {
-    return static_cast<std::uint16_t>((origin.x() >> 3 & 15) << 8 | (origin.y() >> 3 & 15) << 4 | (origin.z() >> 3 & 15));
+    return static_cast<std::uint16_t>((origin.x() >> 3 & 15) << 8 | (origin.y() >> 3 & 15) << 4 |
+                                      (origin.z() >> 3 & 15));
 }
 
 /// The active voxels' box, from the bits of the mask: a word for each x, eight bits in it for each y.
@@ -43,17 +44,18 @@ void expand(openvdb::CoordBBox& box, const Coord& origin, const std::uint64_t* w
     z = (z | z >> 8) & 255;
     low[2] = __builtin_ctzll(z);
     high[2] = 63 - __builtin_clzll(z);
-    box.expand(openvdb::CoordBBox(origin + Coord(low[0], low[1], low[2]), origin + Coord(high[0], high[1], high[2])));
+    box.expand(openvdb::CoordBBox(origin + Coord(low[0], low[1], low[2]),
+                                  origin + Coord(high[0], high[1], high[2])));
 }
 
-/// Writes the values of a leaf as LeafNode::writeBuffers does behind the mask. Where nothing but the background is
-/// inactive, as everywhere without a band, there is no need to look for other inactive values.
+/// Writes the values of a leaf as LeafNode::writeBuffers does behind the mask. Where nothing but the
+/// background is inactive, as everywhere without a band, there is no need to look for other inactive values.
 void write_values(std::ostream& out, const Leaf& leaf, const VdbWriteOptions& options, bool only_background) {
     const auto& mask = leaf.getValueMask();
     const float* values = leaf.buffer().data();
     if (options.half || !only_background) {
-        openvdb::io::writeCompressedValues(out, const_cast<float*>(values), Leaf::SIZE, mask, Leaf::NodeMaskType(),
-                                           options.half);
+        openvdb::io::writeCompressedValues(out, const_cast<float*>(values), Leaf::SIZE, mask,
+                                           Leaf::NodeMaskType(), options.half);
         return;
     }
     out.put(openvdb::io::NO_MASK_OR_INACTIVE_VALS);
@@ -117,7 +119,8 @@ PackedLeaves::PackedLeaves(const StripSorter& sorter, const VdbWriteOptions& opt
 }
 
 std::size_t PackedLeaves::node_index(const Coord& node) const {
-    return (static_cast<std::size_t>(node.x()) * static_cast<std::size_t>(nodes_.y()) + static_cast<std::size_t>(node.y())) *
+    return (static_cast<std::size_t>(node.x()) * static_cast<std::size_t>(nodes_.y()) +
+            static_cast<std::size_t>(node.y())) *
                static_cast<std::size_t>(nodes_.z()) +
            static_cast<std::size_t>(node.z());
 }
@@ -185,7 +188,8 @@ void PackedLeaves::add_slab(const std::vector<std::shared_ptr<const Row>>& rows)
             }
             for (std::size_t p = i; p < last; ++p) {
                 const Row::Part& part = *parts[p].second;
-                store_.append(rows[parts[p].first]->body.data() + part.body_begin, part.body_end - part.body_begin);
+                store_.append(rows[parts[p].first]->body.data() + part.body_begin,
+                              part.body_end - part.body_begin);
                 run.body_bytes += part.body_end - part.body_begin;
             }
             runs_[node_index(parts[i].second->node)].push_back(run);
@@ -210,7 +214,8 @@ PackedLeaves::Node PackedLeaves::pick_up(std::size_t node, bool bodies) const {
     for (const Run& run : runs_[node]) {
         heads.resize(run.heads);
         store_.read(run.at, heads.data(), run.heads * sizeof(Head));
-        if (bodies) store_.read(run.at + run.heads * sizeof(Head), result.bodies.data() + body, run.body_bytes);
+        if (bodies)
+            store_.read(run.at + run.heads * sizeof(Head), result.bodies.data() + body, run.body_bytes);
         for (const Head& head : heads) {
             result.entries.push_back({head, body});
             body += head.bytes;
@@ -259,7 +264,8 @@ void PackedLeaves::write_lower_node(std::ostream& os, std::size_t index, float b
     }
     children.save(os);
     active.save(os);
-    openvdb::io::writeCompressedValues(os, values.data(), LowerNode::NUM_VALUES, active, children, options_.half);
+    openvdb::io::writeCompressedValues(os, values.data(), LowerNode::NUM_VALUES, active, children,
+                                       options_.half);
     for (const Node::Entry& entry : node.entries)
         if (static_cast<SortedBlock::Tile>(entry.head.tile) == SortedBlock::Tile::none)
             os.write(reinterpret_cast<const char*>(entry.head.mask), sizeof entry.head.mask);
@@ -275,12 +281,15 @@ void PackedLeaves::write_upper_node(std::ostream& os, const Coord& first, float 
     });
     children.save(os);
     active.save(os);
-    openvdb::io::writeCompressedValues(os, values.data(), UpperNode::NUM_VALUES, active, children, options_.half);
+    openvdb::io::writeCompressedValues(os, values.data(), UpperNode::NUM_VALUES, active, children,
+                                       options_.half);
     for_each_node(first, [&](const Coord&, std::size_t node) { write_lower_node(os, node, background); });
 }
 
 void PackedLeaves::write_topology(std::ostream& os, float background) const {
-    const auto put = [&](const auto& value) { os.write(reinterpret_cast<const char*>(&value), sizeof value); };
+    const auto put = [&](const auto& value) {
+        os.write(reinterpret_cast<const char*>(&value), sizeof value);
+    };
     put(std::int32_t(1));  // buffers a leaf
     put(options_.half ? openvdb::io::truncateRealToHalf(background) : background);
     openvdb::io::setGridBackgroundValuePtr(os, &background);
@@ -307,7 +316,8 @@ void PackedLeaves::write_buffers(std::ostream& os, const Progress& progress) con
                 os.write(node.bodies.data() + entry.body, entry.head.bytes);
                 ++written;
             }
-            progress.report(static_cast<double>(written) / static_cast<double>(std::max<std::uint64_t>(leaves_, 1)));
+            progress.report(static_cast<double>(written) /
+                            static_cast<double>(std::max<std::uint64_t>(leaves_, 1)));
         });
     });
 }
@@ -323,8 +333,9 @@ std::uint64_t PackedLeaves::bytes_as_tree() const {
         return Of::NUM_VALUES * sizeof(typename Of::UnionType) + node.getChildMask().memUsage() +
                node.getValueMask().memUsage() + sizeof(Coord);
     };
-    return sizeof(openvdb::FloatTree) + sizeof(openvdb::FloatTree::RootNodeType) + upper * of_node(UpperNode()) +
-           lower * of_node(LowerNode()) + leaves_ * Leaf(Coord(), 0.f).memUsage();
+    return sizeof(openvdb::FloatTree) + sizeof(openvdb::FloatTree::RootNodeType) +
+           upper * of_node(UpperNode()) + lower * of_node(LowerNode()) +
+           leaves_ * Leaf(Coord(), 0.f).memUsage();
 }
 
 StreamedGrid::StreamedGrid(std::shared_ptr<const PackedLeaves> leaves, float background)

@@ -12,10 +12,10 @@
 namespace vdbgeo {
 
 /// Takes the sorted strips of a map and keeps what a VDB file will hold of them: leaves in the file's own
-/// form, compressed, and their places. A file has its leaves in the order of the tree (x slowest), strips come
-/// section by section; so what belongs to one node of 128³ voxels is put down together, slab by slab, and
-/// picked up again when its turn comes. Memory: `memory` bytes of packed leaves, the rest on the disk, and 24
-/// bytes for 128 × 128 × 8 voxels.
+/// form, compressed, and their places. A file has its leaves in the order of the tree (x slowest), strips
+/// come section by section; so what belongs to one node of 128³ voxels is put down together, slab by slab,
+/// and picked up again when its turn comes. Memory: `memory` bytes of packed leaves, the rest on the disk,
+/// and 24 bytes for 128 × 128 × 8 voxels.
 class PackedLeaves {
  public:
     PackedLeaves(const StripSorter& sorter, const VdbWriteOptions& options, std::uint64_t memory,
@@ -60,7 +60,7 @@ class PackedLeaves {
 
     VdbWriteOptions options_;
     std::array<int, 3> order_;
-    bool only_background_;  // among the inactive values of leaves
+    bool only_background_;                // among the inactive values of leaves
     openvdb::Coord nodes_;                // nodes of 128³ voxels along x, y, z
     std::vector<std::vector<Run>> runs_;  // of each of them
     ByteStore store_;

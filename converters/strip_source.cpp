@@ -68,7 +68,8 @@ struct StripSource::State {
     int bin = 1;
     bool invert = false, scaled = false;
     double shift = 0, factor = 1;
-    std::array<int, 3> first{}, count{};  // along columns, rows, sections: where the crop begins; samples handed out
+    std::array<int, 3> first{},
+        count{};  // along columns, rows, sections: where the crop begins; samples handed out
     Frame frame;
     std::vector<std::string> warnings;
     bool unpack_first = false;
@@ -95,7 +96,8 @@ struct StripSource::State {
                               std::size_t at) const;
     Strip strip(const Bytes* slab, int slab_first, int section, int sections, int row, int rows_wanted,
                 Scratch& s) const;
-    Strip whole_samples(const Bytes* slab, int slab_first, Strip shape, int section, int row, Scratch& s) const;
+    Strip whole_samples(const Bytes* slab, int slab_first, Strip shape, int section, int row,
+                        Scratch& s) const;
     Strip binned(const Bytes* slab, int slab_first, Strip shape, int section, int row, Scratch& s) const;
     void to_floats(const unsigned char* raw, float* out) const;
     void finish(float* values, std::size_t n) const;
@@ -111,13 +113,14 @@ void StripSource::State::place(const MapReadOptions& options) {
             begin[a] = options.crop->begin[i].value_or(0);
             const int end = options.crop->end[i].value_or(whole.size[a]);
             if (begin[a] >= end || end > whole.size[a])
-                throw InvalidInput(fmt::format("{}: the crop {}:{} along {} does not lie in the map, which has {} samples there",
-                                               name, begin[a], end, "xyz"[a], whole.size[a]));
+                throw InvalidInput(fmt::format(
+                    "{}: the crop {}:{} along {} does not lie in the map, which has {} samples there", name,
+                    begin[a], end, "xyz"[a], whole.size[a]));
             size[a] = end - begin[a];
         }
         if (size[a] < bin)
-            throw InvalidInput(fmt::format("{}: {} samples along {} are too few to bin by {}", name, size[a], "xyz"[a],
-                                           bin));
+            throw InvalidInput(fmt::format("{}: {} samples along {} are too few to bin by {}", name, size[a],
+                                           "xyz"[a], bin));
         if (size[a] % bin != 0)
             warnings.push_back(fmt::format("{} of {} samples along {} are left over by binning and left out",
                                            size[a] % bin, size[a], "xyz"[a]));
@@ -139,7 +142,8 @@ void StripSource::State::unpack(const Progress& progress) {
     const std::uint64_t piece = std::max<std::uint64_t>(1, (std::uint64_t(8) << 20) / layout.section_bytes);
     Bytes bytes;
     while (reader.sections_left() > 0) {
-        const int n = static_cast<int>(std::min<std::uint64_t>(piece, static_cast<std::uint64_t>(reader.sections_left())));
+        const int n = static_cast<int>(
+            std::min<std::uint64_t>(piece, static_cast<std::uint64_t>(reader.sections_left())));
         bytes.resize(layout.section_bytes * static_cast<std::uint64_t>(n));
         reader.read_raw_sections(bytes.data(), n);
         unpacked->append(bytes.data(), bytes.size());
@@ -151,8 +155,8 @@ void StripSource::State::unpack(const Progress& progress) {
 /// Tells the system which sections are wanted next, so that the disk works while we do.
 void StripSource::State::ask_ahead(int section, int sections) const {
     const std::uint64_t begin = static_cast<std::uint64_t>(section), n = static_cast<std::uint64_t>(sections);
-    ::posix_fadvise(descriptor(), static_cast<off_t>(position(begin, 0)), static_cast<off_t>(n * layout.section_bytes),
-                    POSIX_FADV_WILLNEED);
+    ::posix_fadvise(descriptor(), static_cast<off_t>(position(begin, 0)),
+                    static_cast<off_t>(n * layout.section_bytes), POSIX_FADV_WILLNEED);
 }
 
 /// `n` rows of a section as they are in the file: out of the slab that was unpacked, or read into `space`.
@@ -197,14 +201,16 @@ Strip StripSource::State::whole_samples(const Bytes* slab, int slab_first, Strip
     const std::size_t skip = static_cast<std::size_t>(first[0]), piece = rows_in * layout.row_bytes;
     const bool integers = fits_16_bits(layout.type) && !layout.byte_scaled && !scaled;
     const bool as_it_is = !swapped && (integers ? layout.type == SampleType::int16
-                                                       : layout.type == SampleType::float32 && !invert && !scaled);
+                                                : layout.type == SampleType::float32 && !invert && !scaled);
     shape.bias = bias_of(layout.type);
     shape.sign = invert ? -1 : 1;
     if (!slab) s.raw.resize(piece * static_cast<std::size_t>(shape.sections));
     shape.row_stride = columns;
     shape.section_stride = as_it_is && slab ? layout.section_bytes / (integers ? 2 : 4) : rows_in * columns;
-    if (!as_it_is && integers) s.integers.resize(shape.section_stride * static_cast<std::size_t>(shape.sections));
-    if (!as_it_is && !integers) s.floats.resize(shape.section_stride * static_cast<std::size_t>(shape.sections));
+    if (!as_it_is && integers)
+        s.integers.resize(shape.section_stride * static_cast<std::size_t>(shape.sections));
+    if (!as_it_is && !integers)
+        s.floats.resize(shape.section_stride * static_cast<std::size_t>(shape.sections));
     for (int i = 0; i < shape.sections; ++i) {
         const std::size_t n = static_cast<std::size_t>(i);
         const unsigned char* raw = rows(slab, slab_first, section + i, row, shape.rows, s.raw, n * piece);
@@ -236,7 +242,8 @@ Strip StripSource::State::whole_samples(const Bytes* slab, int slab_first, Strip
 /// Means over bin³ samples, summed in the order of the file.
 Strip StripSource::State::binned(const Bytes* slab, int slab_first, Strip shape, int section, int row,
                                  Scratch& s) const {
-    const std::size_t columns = static_cast<std::size_t>(shape.columns), out_rows = static_cast<std::size_t>(shape.rows);
+    const std::size_t columns = static_cast<std::size_t>(shape.columns),
+                      out_rows = static_cast<std::size_t>(shape.rows);
     const std::size_t n = static_cast<std::size_t>(bin);
     const int rows_in = shape.rows * bin;
     shape.row_stride = columns;
@@ -260,7 +267,8 @@ Strip StripSource::State::binned(const Bytes* slab, int slab_first, Strip shape,
             }
         }
         float* out = s.floats.data() + static_cast<std::size_t>(out_section) * shape.section_stride;
-        for (std::size_t i = 0; i < shape.section_stride; ++i) out[i] = static_cast<float>(s.sums[i] * weight);
+        for (std::size_t i = 0; i < shape.section_stride; ++i)
+            out[i] = static_cast<float>(s.sums[i] * weight);
     }
     shape.floats = s.floats.data();
     return shape;
@@ -309,19 +317,21 @@ void StripSource::scale(double shift, double factor) {
     state_->scaled = true;
 }
 
-void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, const Progress& whole, int height,
-                       int group) {
+void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, const Progress& whole,
+                       int height, int group) {
     State& s = *state_;
     const bool unpack = s.unpack_first && !s.unpacked;
     if (unpack) s.unpack(whole.part(0, 0.7));
     const Progress progress = whole.part(unpack ? 0.7 : 0, 1);
-    const int sections = s.count[2], slabs = (sections - 1) / height + 1, strips = (s.count[1] - 1) / leaf::dim + 1;
+    const int sections = s.count[2], slabs = (sections - 1) / height + 1,
+              strips = (s.count[1] - 1) / leaf::dim + 1;
     if (group <= 0) group = strips;
     const bool any_order = s.in_any_order();
     const auto sections_of = [&](int slab) { return std::min(height, sections - slab * height); };
     const auto first_of = [&](int slab) { return s.first[2] + slab * height * s.bin; };
     Bytes slab_bytes, next_bytes;
-    const auto fetch = [&](int slab, Bytes& into) {  // the raw sections of a slab, or word that they will be wanted
+    const auto fetch = [&](int slab,
+                           Bytes& into) {  // the raw sections of a slab, or word that they will be wanted
         if (slab >= slabs) return;
         const int n = sections_of(slab) * s.bin;
         if (any_order) return s.ask_ahead(first_of(slab), n);
@@ -337,12 +347,13 @@ void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, c
             const std::size_t here = static_cast<std::size_t>(std::min(group, strips - first));
             begin(here);
             parallel_for(here, 1, [&](std::size_t i) {
-                const int row = first + static_cast<int>(i), rows = std::min(leaf::dim, s.count[1] - row * leaf::dim);
+                const int row = first + static_cast<int>(i),
+                          rows = std::min(leaf::dim, s.count[1] - row * leaf::dim);
                 // Isolated: a loop inside `visit` must not have this thread take up another strip, for which
                 // it has only one scratch.
                 tbb::this_task_arena::isolate([&] {
-                    visit(s.strip(bytes, first_of(slab), slab * height, sections_of(slab), row * leaf::dim, rows,
-                                  s.scratch.local()),
+                    visit(s.strip(bytes, first_of(slab), slab * height, sections_of(slab), row * leaf::dim,
+                                  rows, s.scratch.local()),
                           slab, row, i);
                 });
             });

@@ -1,4 +1,5 @@
-// The samples of an MRC file as strips, a row of blocks each: cropped, binned, negated, on the scale asked for.
+// The samples of an MRC file as strips, a row of blocks each: cropped, binned, negated, on the scale asked
+// for.
 #pragma once
 
 #include <functional>

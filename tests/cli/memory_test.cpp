@@ -25,7 +25,8 @@ class Memory : public Cli {
                 state = state * 6364136223846793005u + 1442695040888963407u;
                 v = static_cast<std::int16_t>(state >> 48);
             }
-            out.write(reinterpret_cast<const char*>(section.data()), static_cast<std::streamsize>(2 * section.size()));
+            out.write(reinterpret_cast<const char*>(section.data()),
+                      static_cast<std::streamsize>(2 * section.size()));
         }
     }
 };
@@ -33,16 +34,17 @@ class Memory : public Cli {
 }  // namespace
 
 TEST_F(Memory, ABudgetHoldsAndChangesNoByte) {
-    // As a tree the grid takes 400 MB, packed nearly as much. The runs come first: a child's peak counts from its
-    // parent's size.
-    const Ended small = good({"convert", at("big.mrc"), at("small.vdb"), "--memory", "128M"});
-    const Ended large = good({"convert", at("big.mrc"), at("large.vdb"), "--memory", "2G"});
-    const Ended back = good({"convert", at("small.vdb"), at("back.mrc")});
-    const Ended binned = good({"convert", at("big.mrc"), at("half.mrc"), "--bin", "2", "--memory", "128M"});
-    const Ended mask = vdbgeo({"convert", at("big.mrc"), at("never.vdb"), "--threshold", "0", "--despeckle", "5",
-                               "--memory", "64M", "--quiet"});
-    const Ended selected = good({"convert", at("big.mrc"), at("selected.vdb"), "--threshold", "0", "--despeckle", "5",
-                                 "--halo", "1", "--memory", "192M", "--threads", "2"});
+    // As a tree the grid takes 400 MB, packed nearly as much. The runs come first: a child's peak counts from
+    // its parent's size.
+    const Ended small = good({"convert", at("big.mrc"), at("small.vdb"), "--memory", "128M", "-j", "2"});
+    const Ended large = good({"convert", at("big.mrc"), at("large.vdb"), "--memory", "2G", "-j", "2"});
+    const Ended back = good({"convert", at("small.vdb"), at("back.mrc"), "-j", "2"});
+    const Ended binned =
+        good({"convert", at("big.mrc"), at("half.mrc"), "--bin", "2", "--memory", "128M", "-j", "2"});
+    const Ended mask = vdbgeo({"convert", at("big.mrc"), at("never.vdb"), "--threshold", "0", "--despeckle",
+                               "5", "--memory", "64M", "--quiet", "-j", "2"});
+    const Ended selected = good({"convert", at("big.mrc"), at("selected.vdb"), "--threshold", "0",
+                                 "--despeckle", "5", "--halo", "1", "--memory", "192M", "-j", "2"});
     EXPECT_LT(small.peak_bytes, 128u << 20);
     EXPECT_NE(small.out.find("went through a temporary file"), std::string::npos) << small.out;
     EXPECT_LT(large.peak_bytes, 2u << 30);

@@ -1,7 +1,7 @@
 // Maps gone through piece by piece: against a plain model of what crop, bin, scales, thresholds, masks,
 // despeckling and halos mean, and the same bytes however much memory there is.
-#include <gtest/gtest.h>
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -33,7 +33,8 @@ struct Model {
     std::vector<char> kept;
 
     std::size_t at(int x, int y, int z) const {
-        return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size.y()) + static_cast<std::size_t>(y)) *
+        return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size.y()) +
+                static_cast<std::size_t>(y)) *
                    static_cast<std::size_t>(size.x()) +
                static_cast<std::size_t>(x);
     }
@@ -100,7 +101,8 @@ void despeckle(Model& m, std::size_t least) {
         std::vector<std::array<int, 3>> found{{x, y, z}};
         piece[m.at(x, y, z)] = count;
         for (std::size_t i = 0; i < found.size(); ++i)
-            for (const auto& step : {std::array<int, 3>{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}) {
+            for (const auto& step :
+                 {std::array<int, 3>{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}) {
                 const int a = found[i][0] + step[0], b = found[i][1] + step[1], c = found[i][2] + step[2];
                 if (!m.inside(a, b, c) || !m.kept[m.at(a, b, c)] || piece[m.at(a, b, c)] >= 0) continue;
                 piece[m.at(a, b, c)] = count;
@@ -118,7 +120,8 @@ void grow(Model& m, int n) {
         for (int k = -n; k <= n; ++k)
             for (int j = -n; j <= n; ++j)
                 for (int i = -n; i <= n; ++i)
-                    if (m.inside(x + i, y + j, z + k) && before[m.at(x + i, y + j, z + k)]) m.kept[m.at(x, y, z)] = 1;
+                    if (m.inside(x + i, y + j, z + k) && before[m.at(x + i, y + j, z + k)])
+                        m.kept[m.at(x, y, z)] = 1;
     });
 }
 
@@ -148,7 +151,10 @@ class MapStream : public ::testing::Test {
         map.origin = {10, -20, 30};
         map.voxel = {2, 2, 2};
         for (const float v : test::noise(43 * 37 * 29, 7))
-            map.values.push_back(mode == 2 ? double(v) : std::floor(mode == 101 ? 8 + 7 * v : mode == 6 ? 30000 + 30000 * v : 100 * v));
+            map.values.push_back(mode == 2 ? double(v)
+                                           : std::floor(mode == 101 ? 8 + 7 * v
+                                                        : mode == 6 ? 30000 + 30000 * v
+                                                                    : 100 * v));
         return map;
     }
     std::filesystem::path file(const std::string& bytes, const std::string& name = "a.mrc") {
@@ -164,7 +170,8 @@ class MapStream : public ::testing::Test {
         write_vdb({map.map.grid}, folder_ / out, vdb);
     }
     /// The file of a stream is that of a map in memory, for any memory, number of threads and packing.
-    void expect_same_files(const MrcBytes& bytes, const MapReadOptions& options, const VdbWriteOptions& vdb = {}) {
+    void expect_same_files(const MrcBytes& bytes, const MapReadOptions& options,
+                           const VdbWriteOptions& vdb = {}) {
         const auto in = file(bytes.str());
         write_vdb({read_map(in, options).map.grid}, folder_ / "whole.vdb", vdb);
         const std::string whole = bytes_of("whole.vdb");
@@ -212,14 +219,16 @@ TEST_F(MapStream, EveryModeAndAxisOrderGivesTheSameFileAnyWay) {
 }
 
 TEST_F(MapStream, ThresholdsBandsAndQuantisationGiveTheSameFileAnyWay) {
-    MapReadOptions band = above(0.2f), sigma, percentile, fraction, quantised = above(0.3f), inverted = above(0.1f);
+    MapReadOptions band = above(0.2f), sigma, percentile, fraction, quantised = above(0.3f),
+                   inverted = above(0.1f);
     band.sparsify.band = 0.25f;
     sigma.threshold = ThresholdRule{ThresholdRule::Kind::sigma, 0.7};
     percentile.threshold = ThresholdRule{ThresholdRule::Kind::percentile, 80};
     fraction.threshold = ThresholdRule{ThresholdRule::Kind::fraction, 0.1};
     quantised.quantise = ThresholdRule{ThresholdRule::Kind::value, 0.1};
     inverted.invert = true;
-    for (const MapReadOptions& options : {above(0.9f), band, sigma, percentile, fraction, quantised, inverted})
+    for (const MapReadOptions& options :
+         {above(0.9f), band, sigma, percentile, fraction, quantised, inverted})
         expect_same_files(noise_map(), options);
     VdbWriteOptions zip, none;
     zip.compression = VdbWriteOptions::Compression::zip;
@@ -296,7 +305,8 @@ TEST_F(MapStream, NormalisedMapsHaveTheStatisticsAskedFor) {
         EXPECT_NEAR(sigma.statistics.mean, 0, 1e-6);
         EXPECT_NEAR(sigma.statistics.rms, 1, 1e-6);
         const float before = read_map(path).map.grid->tree().getValue(Coord(5, 6, 7));
-        EXPECT_FLOAT_EQ(sigma.grid->tree().getValue(Coord(5, 6, 7)), static_cast<float>((before - raw.mean) / raw.rms));
+        EXPECT_FLOAT_EQ(sigma.grid->tree().getValue(Coord(5, 6, 7)),
+                        static_cast<float>((before - raw.mean) / raw.rms));
         options.normalise = MapReadOptions::Normalise::range;
         const DensityMap range = read_map(path, options).map;
         EXPECT_EQ(range.statistics.min, 0);
@@ -335,12 +345,14 @@ TEST_F(MapStream, MaskDespeckleAndHaloAgreeWithThePlainWay) {
         MrcBytes mask = noise_map(0, {1, 2, 3});
         const Model whole = model_of(bytes);
         mask.size = {whole.size.x(), whole.size.y(), whole.size.z()};
-        for (std::size_t i = 0; i < mask.values.size(); ++i) mask.values[i] = i % 43 < 30 ? 1 : i % 2 ? 0 : -5;
+        for (std::size_t i = 0; i < mask.values.size(); ++i)
+            mask.values[i] = i % 43 < 30 ? 1 : i % 2 ? 0 : -5;
         const Model allowed = model_of(mask);
         for (const bool with_mask : {false, true})
             for (const std::uint64_t pieces : {std::uint64_t(0), std::uint64_t(12)})
                 for (const int halo : {0, 2}) {
-                    SCOPED_TRACE(fmt::format("mask {} despeckle {} halo {} first axis {}", with_mask, pieces, halo, axes[0]));
+                    SCOPED_TRACE(fmt::format("mask {} despeckle {} halo {} first axis {}", with_mask, pieces,
+                                             halo, axes[0]));
                     MapReadOptions options = above(0.35f);
                     if (with_mask) options.mask = file(mask.str(), "mask.mrc");
                     options.despeckle = pieces;
@@ -426,7 +438,8 @@ TEST_F(MapStream, LeavesOfSeveralNodesAreStoredInTheOrderOfTheTree) {
         MrcBytes bytes = noise_map();
         bytes.size = size;
         bytes.values.clear();
-        for (const float v : test::noise(static_cast<std::size_t>(size[0] * size[1] * size[2]), 3)) bytes.values.push_back(v);
+        for (const float v : test::noise(static_cast<std::size_t>(size[0] * size[1] * size[2]), 3))
+            bytes.values.push_back(v);
         expect_same_files(bytes, above(0.8f));
     }
 }
@@ -434,7 +447,8 @@ TEST_F(MapStream, LeavesOfSeveralNodesAreStoredInTheOrderOfTheTree) {
 TEST_F(MapStream, TilesAndBackgroundAreHeldAgainstTheRangeOfHalvesToo) {
     MrcBytes bytes = noise_map();
     const Model m = model_of(bytes);
-    m.each([&](int x, int y, int z) { bytes.values[m.at(x, y, z)] = x < 8 && y < 8 && z < 8 ? 1e6 : x * 0.5; });
+    m.each(
+        [&](int x, int y, int z) { bytes.values[m.at(x, y, z)] = x < 8 && y < 8 && z < 8 ? 1e6 : x * 0.5; });
     VdbWriteOptions halves;
     halves.half = true;
     EXPECT_THROW(stream_map(file(bytes.str()), {}, halves), InvalidInput);
@@ -452,9 +466,10 @@ TEST_F(MapStream, PercentilesOfVeryWideMapsAreExact) {
     for (const double percent : {55.0, 95.0}) {
         MapReadOptions options;
         options.threshold = ThresholdRule{ThresholdRule::Kind::percentile, percent};
-        const double level = sorted[static_cast<std::size_t>(std::ceil(percent * double(sorted.size()) / 100)) - 1];
-        const auto kept = static_cast<std::uint64_t>(
-            sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), level));
+        const double level =
+            sorted[static_cast<std::size_t>(std::ceil(percent * double(sorted.size()) / 100)) - 1];
+        const auto kept =
+            static_cast<std::uint64_t>(sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), level));
         EXPECT_EQ(read_map(path, options).map.grid->activeVoxelCount(), kept);
     }
 }

@@ -16,7 +16,8 @@ using test::TempFolder;
 
 TEST(ByteStore, GivesBackWhatWasPutDownWhereverItLies) {
     TempFolder folder;
-    for (const std::uint64_t memory : {std::uint64_t(0), std::uint64_t(1) << 20, std::uint64_t(3) << 20, std::uint64_t(1) << 30}) {
+    for (const std::uint64_t memory :
+         {std::uint64_t(0), std::uint64_t(1) << 20, std::uint64_t(3) << 20, std::uint64_t(1) << 30}) {
         ByteStore store(memory, folder.path());
         std::mt19937 random(5);
         std::string all;
@@ -29,7 +30,8 @@ TEST(ByteStore, GivesBackWhatWasPutDownWhereverItLies) {
         }
         EXPECT_EQ(store.spilled(), memory >= all.size() ? 0 : all.size() - memory);
         for (int i = 0; i < 300; ++i) {
-            const std::size_t at = random() % all.size(), n = std::min<std::size_t>(random() % 2'000'000, all.size() - at);
+            const std::size_t at = random() % all.size(),
+                              n = std::min<std::size_t>(random() % 2'000'000, all.size() - at);
             std::string got(n, '\0');
             store.read(at, got.data(), n);
             ASSERT_TRUE(got == all.substr(at, n)) << at << " " << n << " of " << memory;
@@ -61,7 +63,8 @@ TEST(StripSource, AnyHeightAndGroupHandsOutEverySampleOnce) {
             std::size_t strips = 0, ended = 0;
             source.pass(
                 [&](const Strip& strip, int slab, int row, std::size_t place) {
-                    EXPECT_EQ(static_cast<std::size_t>(row) % static_cast<std::size_t>(group ? group : 9), place);
+                    EXPECT_EQ(static_cast<std::size_t>(row) % static_cast<std::size_t>(group ? group : 9),
+                              place);
                     for (int s = 0; s < strip.sections; ++s)
                         for (int r = 0; r < strip.rows; ++r)
                             strip.copy_row(s, r, all.data() + ((slab * height + s) * 70 + row * 8 + r) * 23);
@@ -70,6 +73,7 @@ TEST(StripSource, AnyHeightAndGroupHandsOutEverySampleOnce) {
             const std::size_t slabs = static_cast<std::size_t>((19 - 1) / height + 1);
             EXPECT_EQ(strips, 9 * slabs);
             EXPECT_EQ(ended, slabs * (group ? 5 : 1));
-            for (std::size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all[i], static_cast<float>(bytes.values[i]));
+            for (std::size_t i = 0; i < all.size(); ++i)
+                ASSERT_EQ(all[i], static_cast<float>(bytes.values[i]));
         }
 }

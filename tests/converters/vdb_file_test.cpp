@@ -104,7 +104,8 @@ openvdb::MetaMap file_metadata(const std::filesystem::path& path) {
     return *file.getMetadata();
 }
 
-/// A grid whose nodes and leaves OpenVDB writes, as it would those of any, but without notes for delayed loading.
+/// A grid whose nodes and leaves OpenVDB writes, as it would those of any, but without notes for delayed
+/// loading.
 struct PlainGrid : SelfWritingGrid {
     explicit PlainGrid(const FloatGrid& grid)
         : SelfWritingGrid(std::const_pointer_cast<openvdb::FloatTree>(grid.constTreePtr())) {

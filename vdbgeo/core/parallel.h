@@ -15,8 +15,9 @@ namespace vdbgeo {
 
 namespace detail {
 
-/// Tells the thread sanitizer what the scheduler's library, which is not instrumented, keeps from it: what was
-/// written before a loop is seen in it, and what was written in a loop is seen after it. Nothing in other builds.
+/// Tells the thread sanitizer what the scheduler's library, which is not instrumented, keeps from it: what
+/// was written before a loop is seen in it, and what was written in a loop is seen after it. Nothing in other
+/// builds.
 class LoopFence {
  public:
 #ifdef __SANITIZE_THREAD__

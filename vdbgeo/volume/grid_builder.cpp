@@ -18,8 +18,8 @@ void GridBuilder::add_sections(const float* data, int count) {
               sections = sorter_.size()[sorter_.order()[2]];
     const int done = slabs_done_ * slab;
     if (count < 1 || count > sections - done || (count % slab != 0 && count != sections - done))
-        throw InvalidInput(fmt::format("{} sections handed over after {} of {}", count,
-                                       std::min(done, sections), sections));
+        throw InvalidInput(
+            fmt::format("{} sections handed over after {} of {}", count, std::min(done, sections), sections));
     Strip strip;
     strip.columns = columns;
     strip.row_stride = static_cast<std::size_t>(columns);

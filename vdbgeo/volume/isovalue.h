@@ -11,7 +11,8 @@ namespace vdbgeo {
 /// statistics.
 struct Isovalue {
     enum class Rule {
-        automatic,  ///< by the class of the grid: 0 for a level set, half the maximum for a fog volume, else mean
+        automatic,  ///< by the class of the grid: 0 for a level set, half the maximum for a fog volume, else
+                    ///< mean
                     ///< + 3 rms over all samples of the map
         value,      ///< `number`
         sigma       ///< mean + `number` · rms over all samples of the map
@@ -24,8 +25,8 @@ struct Isovalue {
     static Isovalue parse(const std::string& text);
     /// The inverse of parse.
     std::string text() const;
-    /// The level for a map with these statistics in a grid of this class. Throws InvalidInput where the map has no
-    /// finite sample to take statistics of.
+    /// The level for a map with these statistics in a grid of this class. Throws InvalidInput where the map
+    /// has no finite sample to take statistics of.
     double resolve(const Statistics& statistics, openvdb::GridClass grid_class = openvdb::GRID_UNKNOWN) const;
 };
 

@@ -24,7 +24,9 @@ struct Window {
     const Strip& strip;
     int column, width;
 
-    bool whole() const { return width == leaf::dim && strip.rows == leaf::dim && strip.sections == leaf::dim; }
+    bool whole() const {
+        return width == leaf::dim && strip.rows == leaf::dim && strip.sections == leaf::dim;
+    }
     std::size_t at(int section, int row) const {
         return static_cast<std::size_t>(section) * strip.section_stride +
                static_cast<std::size_t>(row) * strip.row_stride + static_cast<std::size_t>(column);
@@ -119,7 +121,8 @@ struct IntegerSums {
         if (count == 0) return m;
         const double n = static_cast<double>(count);
         __extension__ using Wide = __int128;
-        const Wide spread = static_cast<Wide>(count) * static_cast<Wide>(squares) - static_cast<Wide>(sum) * sum;
+        const Wide spread =
+            static_cast<Wide>(count) * static_cast<Wide>(squares) - static_cast<Wide>(sum) * sum;
         m.squares = static_cast<double>(spread) / n;
         m.mean = strip.sign * (static_cast<double>(sum) / n + strip.bias);
         const float a = value_of(strip, static_cast<std::int16_t>(min)),
@@ -200,7 +203,8 @@ bool all_same_bits(const float* values) {
     return std::memcmp(values, values + 1, (leaf::size - 1) * sizeof(float)) == 0;
 }
 
-constexpr std::array<std::size_t, 3> leaf_step{64, 8, 1};  // in a leaf, from one sample to the next along x, y, z
+constexpr std::array<std::size_t, 3> leaf_step{64, 8,
+                                               1};  // in a leaf, from one sample to the next along x, y, z
 
 }  // namespace
 
@@ -223,7 +227,8 @@ void SparsifyOptions::check() const {
 }
 
 void Strip::copy_row(int section, int row, float* out) const {
-    const std::size_t at = static_cast<std::size_t>(section) * section_stride + static_cast<std::size_t>(row) * row_stride,
+    const std::size_t at = static_cast<std::size_t>(section) * section_stride +
+                           static_cast<std::size_t>(row) * row_stride,
                       n = static_cast<std::size_t>(columns);
     if (floats) {
         std::memcpy(out, floats + at, n * sizeof(float));
@@ -299,8 +304,7 @@ void StripSorter::sample_border(const Strip& strip, int slab, int row, std::vect
                         sections = static_cast<std::uint64_t>(size_[order_[2]]);
     const std::uint64_t side = columns > 1 ? 2 : 1;  // of an inner row
     const std::uint64_t outer_section = columns * rows;
-    const std::uint64_t inner_section =
-        rows > 1 ? 2 * columns + side * (rows - 2) : columns;
+    const std::uint64_t inner_section = rows > 1 ? 2 * columns + side * (rows - 2) : columns;
     const auto take = [&](std::uint64_t number, int s, int r, std::uint64_t c) {
         if (number % border_step_ != 0) return;
         const std::size_t at = static_cast<std::size_t>(s) * strip.section_stride +
@@ -309,15 +313,18 @@ void StripSorter::sample_border(const Strip& strip, int slab, int row, std::vect
         if (std::isfinite(v)) out.push_back(v);
     };
     for (int s = 0; s < strip.sections; ++s) {
-        const std::uint64_t section = static_cast<std::uint64_t>(slab) * leaf::dim + static_cast<std::uint64_t>(s);
+        const std::uint64_t section =
+            static_cast<std::uint64_t>(slab) * leaf::dim + static_cast<std::uint64_t>(s);
         const bool outer = section == 0 || section == sections - 1;
         const std::uint64_t before =
             section == 0 ? 0 : outer_section + (section - 1) * inner_section;  // in the sections before
         for (int r = 0; r < strip.rows; ++r) {
-            const std::uint64_t line = static_cast<std::uint64_t>(row) * leaf::dim + static_cast<std::uint64_t>(r);
+            const std::uint64_t line =
+                static_cast<std::uint64_t>(row) * leaf::dim + static_cast<std::uint64_t>(r);
             if (outer || line == 0 || line == rows - 1) {
-                const std::uint64_t start =
-                    before + (outer ? line * columns : line == 0 ? 0 : columns + side * (rows - 2));
+                const std::uint64_t start = before + (outer       ? line * columns
+                                                      : line == 0 ? 0
+                                                                  : columns + side * (rows - 2));
                 for (std::uint64_t c = (border_step_ - start % border_step_) % border_step_; c < columns;
                      c += border_step_)
                     take(start + c, s, r, c);
@@ -351,17 +358,20 @@ void StripSorter::load(const Strip& strip, int column, Block& block) const {
         for (int s = 0; s < strip.sections; ++s)
             for (int r = 0; r < strip.rows; ++r)
                 for (int c = 0; c < w.width; ++c)
-                    block.values[static_cast<std::size_t>(c) * step(0) + static_cast<std::size_t>(r) * step(1) +
+                    block.values[static_cast<std::size_t>(c) * step(0) +
+                                 static_cast<std::size_t>(r) * step(1) +
                                  static_cast<std::size_t>(s) * step(2)] = tile[64 * s + 8 * r + c];
         return;
     }
-    // z is what runs fastest in a leaf: the plane of columns and z is transposed for each step of the third axis.
+    // z is what runs fastest in a leaf: the plane of columns and z is transposed for each step of the third
+    // axis.
     const int z = order_[0] == 2 ? 0 : order_[1] == 2 ? 1 : 2, third = z == 1 ? 2 : 1;
     for (std::size_t i = 0; i < 8; ++i) {
         const float* in = tile + (third == 1 ? 8 : 64) * i;
         float* out = block.values + step(third) * i;
         if (z == 0)
-            for (std::size_t j = 0; j < 8; ++j) std::memcpy(out + step(2) * j, in + 64 * j, 8 * sizeof(float));
+            for (std::size_t j = 0; j < 8; ++j)
+                std::memcpy(out + step(2) * j, in + 64 * j, 8 * sizeof(float));
         else
             transpose_8x8(in, z == 1 ? 8 : 64, out, step(0));
     }
@@ -398,7 +408,8 @@ bool StripSorter::mark_above(const Block& block, leaf::Leaf& leaf) const {
 
 /// Marks what is kept of a block as active in result.leaf, and gives it its values; true where there is any.
 bool StripSorter::mark_kept(const Block& block, SortedBlock& result) const {
-    if (!keep_ && options_.threshold && !options_.band && block.whole()) return mark_above(block, *result.leaf);
+    if (!keep_ && options_.threshold && !options_.band && block.whole())
+        return mark_above(block, *result.leaf);
     const float low = lower_end(), high = upper_end();
     const bool keep_all = !keep_ && !options_.threshold;
     const auto* chosen = keep_ ? keep_->probeConstLeaf(result.origin) : nullptr;
@@ -408,8 +419,8 @@ bool StripSorter::mark_kept(const Block& block, SortedBlock& result) const {
     block.for_each_inside([&](int i) {
         const float v = block.values[i];
         const auto n = static_cast<openvdb::Index32>(i);
-        const bool kept = keep_all || (std::isfinite(v) && (keep_ ? !chosen || chosen->isValueOn(n)
-                                                                  : v > low && v <= high));
+        const bool kept = keep_all || (std::isfinite(v) &&
+                                       (keep_ ? !chosen || chosen->isValueOn(n) : v > low && v <= high));
         if (kept) {
             out[i] = v;
             mask.setOn(n);

@@ -76,7 +76,8 @@ struct SortedStrip {
     RoundingError rounding;     ///< of the quantisation
 };
 
-/// Sorts strips into blocks. `sort` may be called from many threads; what it gives depends on the strip alone.
+/// Sorts strips into blocks. `sort` may be called from many threads; what it gives depends on the strip
+/// alone.
 ///
 /// Strips are numbered by their place: `slab` counts eight sections each, `row` eight rows. Cost: one read of
 /// the samples (16-bit integers eight at a time), and a copy of what stays.

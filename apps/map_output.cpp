@@ -111,13 +111,8 @@ Json convert_map_to_map(const std::string& in, const std::string& out, const Map
     for (const std::string& w : copy.warnings) session.warn(in + ": " + w);
     const Statistics& s = copy.report.statistics;
     Json j{{"in", in}, {"out", out}};
-    j["size"] = {copy.frame.size.x(), copy.frame.size.y(), copy.frame.size.z()};
-    j["voxel_size_A"] = to_json(copy.frame.voxel_size());
-    j["origin_A"] = to_json(copy.frame.origin);
-    j["min"] = s.min;
-    j["max"] = s.max;
-    j["mean"] = s.mean;
-    j["rms"] = s.rms;
+    j.update(frame_json(copy.frame));
+    j.update(statistics_json(s));
     j["warnings"] = copy.warnings;
     j["notes"] = copy.notes;
     j["seconds"] = {{"convert", seconds}};

@@ -134,6 +134,16 @@ Json mrc_json(const MrcReader& reader, const Statistics& s, const std::vector<st
     return j;
 }
 
+Json frame_json(const Frame& f) {
+    return {{"size", {f.size.x(), f.size.y(), f.size.z()}},
+            {"voxel_size_A", to_json(f.voxel_size())},
+            {"origin_A", to_json(f.origin)}};
+}
+
+Json statistics_json(const Statistics& s) {
+    return {{"min", s.min}, {"max", s.max}, {"mean", s.mean}, {"rms", s.rms}};
+}
+
 Json grid_json(const DensityMap& map) {
     const openvdb::FloatGrid& grid = *map.grid;
     const Frame& f = map.frame;
@@ -150,17 +160,12 @@ Json grid_json(const DensityMap& map) {
     j["background"] = grid.background();
     j["class"] = class_name(grid.getGridClass());
     j["transform"] = matrix_json(f);
-    j["size"] = {f.size.x(), f.size.y(), f.size.z()};
-    j["voxel_size_A"] = to_json(f.voxel_size());
-    j["origin_A"] = to_json(f.origin);
+    j.update(frame_json(f));
     if (!box.empty()) {
         j["active_box_min"] = {box.min().x(), box.min().y(), box.min().z()};
         j["active_box_max"] = {box.max().x(), box.max().y(), box.max().z()};
     }
-    j["min"] = map.statistics.min;
-    j["max"] = map.statistics.max;
-    j["mean"] = map.statistics.mean;
-    j["rms"] = map.statistics.rms;
+    j.update(statistics_json(map.statistics));
     return j;
 }
 

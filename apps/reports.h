@@ -20,7 +20,10 @@ std::vector<std::string> measures_text(const MeshMeasures& m);
 /// Header, frame and statistics of an MRC or CCP4 file.
 Json mrc_json(const MrcReader& reader, const Statistics& statistics,
               const std::vector<std::string>& warnings);
-/// A grid in memory.
+/// What every map and grid tells: size, voxel_size_A, origin_A; min, max, mean, rms.
+Json frame_json(const Frame& frame);
+Json statistics_json(const Statistics& statistics);
+/// A grid in memory, or a streamed one.
 Json grid_json(const DensityMap& map);
 
 /// A JSON object as aligned "key  value" lines.

@@ -1,0 +1,132 @@
+#include "vdbgeo/stencil/block_field.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <new>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/volume/leaf_layout.h"
+
+namespace vdbgeo::stencil {
+namespace {
+
+constexpr std::size_t huge_page = std::size_t(2) << 20, cache_line = 64;
+constexpr std::size_t reduce_block = 64;  // bricks
+
+}  // namespace
+
+void BlockField::Free::operator()(float* p) const { std::free(p); }
+
+BlockField::BlockField(std::size_t bricks) : bricks_(bricks) {
+    const std::size_t wanted = std::max(bricks, std::size_t(1)) * brick_size * sizeof(float);
+    const std::size_t alignment = wanted >= 4 * huge_page ? huge_page : cache_line;
+    const std::size_t bytes = (wanted + alignment - 1) / alignment * alignment;
+    void* p = std::aligned_alloc(alignment, bytes);
+    if (!p) throw std::bad_alloc();
+#ifdef MADV_HUGEPAGE
+    if (alignment == huge_page) madvise(p, bytes, MADV_HUGEPAGE);  // fewer misses of the TLB; advice only
+#endif
+    data_.reset(static_cast<float*>(p));
+}
+
+double FieldSummary::variance() const {
+    if (count == 0) return 0;
+    const double m = mean();
+    return std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m);
+}
+
+FieldSummary summarize(const BlockLayout& layout, const float* bricks) {
+    FieldSummary start;
+    start.min = std::numeric_limits<float>::infinity();
+    start.max = -start.min;
+    const auto part = [&](std::size_t begin, std::size_t end) {
+        FieldSummary s = start;
+        for (std::size_t i = begin; i < end; ++i) {
+            const float* v = bricks + i * BlockField::brick_size;
+            for (std::size_t x = 0; x < 8; ++x)
+                for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
+                    const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
+                    if (!std::isfinite(value)) {
+                        ++s.non_finite;
+                        continue;
+                    }
+                    ++s.count;
+                    s.sum += value;
+                    s.sum_of_squares += static_cast<double>(value) * value;
+                    s.min = std::min(s.min, value);
+                    s.max = std::max(s.max, value);
+                }
+        }
+        return s;
+    };
+    FieldSummary total = fixed_order_reduce(layout.brick_count(), reduce_block, start, part,
+                                            [](FieldSummary& a, const FieldSummary& b) {
+                                                a.sum += b.sum;
+                                                a.sum_of_squares += b.sum_of_squares;
+                                                a.min = std::min(a.min, b.min);
+                                                a.max = std::max(a.max, b.max);
+                                                a.count += b.count;
+                                                a.non_finite += b.non_finite;
+                                            });
+    if (total.count == 0) total.min = total.max = 0;
+    return total;
+}
+
+double squared_distance(const BlockLayout& layout, const float* a, const float* b) {
+    const auto part = [&](std::size_t begin, std::size_t end) {
+        double sum = 0;
+        // Inactive voxels are 0 in every field.
+        for (std::size_t i = begin * BlockField::brick_size; i < end * BlockField::brick_size; ++i) {
+            const double d = static_cast<double>(a[i]) - b[i];
+            sum += d * d;
+        }
+        return sum;
+    };
+    return fixed_order_reduce(layout.brick_count(), reduce_block, 0.0, part,
+                              [](double& total, double value) { total += value; });
+}
+
+void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out) {
+    parallel_blocks(layout.brick_count(), reduce_block, [&](std::size_t begin, std::size_t end) {
+        openvdb::FloatTree::LeafNodeType const* node = nullptr;
+        openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
+        for (std::size_t i = begin; i < end; ++i) {
+            node = accessor.probeConstLeaf(layout.origin(i));
+            if (!node) throw InvalidInput("the tree lacks a leaf of its layout");
+            const float* in = node->buffer().data();
+            float* to = out + i * BlockField::brick_size;
+            if (layout.full(i)) {
+                for (int k = 0; k < leaf::size; ++k) to[k] = in[k] - offset;
+                continue;
+            }
+            for (int k = 0; k < leaf::size; ++k) {
+                const bool on = layout.mask(i)[static_cast<std::size_t>(k >> 6)] >> (k & 63) & 1;
+                to[k] = on ? in[k] - offset : 0.0f;
+            }
+        }
+    });
+}
+
+void store(const BlockLayout& layout, const float* bricks, float offset, openvdb::FloatTree& tree) {
+    std::vector<openvdb::FloatTree::LeafNodeType*> nodes(layout.brick_count());
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        nodes[i] = tree.probeLeaf(layout.origin(i));
+        if (!nodes[i]) throw InvalidInput("the tree lacks a leaf of its layout");
+    }
+    parallel_for(nodes.size(), 64, [&](std::size_t i) {
+        const float* in = bricks + i * BlockField::brick_size;
+        float* to = nodes[i]->buffer().data();
+        for (std::size_t x = 0; x < 8; ++x)
+            for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
+                const std::size_t k = 64 * x + static_cast<std::size_t>(__builtin_ctzll(word));
+                to[k] = in[k] + offset;
+            }
+    });
+}
+
+}  // namespace vdbgeo::stencil

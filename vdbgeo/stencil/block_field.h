@@ -1,0 +1,58 @@
+// One number a voxel over the bricks of a BlockLayout.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstddef>
+#include <memory>
+
+#include "vdbgeo/stencil/block_layout.h"
+
+namespace vdbgeo::stencil {
+
+/// Floats for a number of bricks, on memory that is aligned to cache lines, and to huge pages where it is
+/// large enough for them. Not initialised. Moves, does not copy.
+class BlockField {
+ public:
+    static constexpr std::size_t brick_size = 512;
+
+    BlockField() = default;
+    explicit BlockField(std::size_t bricks);
+
+    bool empty() const { return !data_; }
+    std::size_t bricks() const { return bricks_; }
+    float* brick(std::size_t i) { return data_.get() + i * brick_size; }
+    const float* brick(std::size_t i) const { return data_.get() + i * brick_size; }
+    std::size_t memory() const { return bricks_ * brick_size * sizeof(float); }
+
+ private:
+    struct Free {
+        void operator()(float* p) const;
+    };
+    std::unique_ptr<float[], Free> data_;
+    std::size_t bricks_ = 0;
+};
+
+/// What a field holds in its active voxels. Sums are in double and in a fixed order.
+struct FieldSummary {
+    double sum = 0, sum_of_squares = 0;
+    float min = 0, max = 0;  ///< 0 without voxels; of the finite values
+    std::uint64_t count = 0, non_finite = 0;
+    double mean() const { return count ? sum / static_cast<double>(count) : 0; }
+    /// Variance of the values, ≥ 0.
+    double variance() const;
+};
+
+/// A field as it is in memory: brick i of the layout at `bricks` + 512 i.
+FieldSummary summarize(const BlockLayout& layout, const float* bricks);
+
+/// Σ (a − b)² over the active voxels.
+double squared_distance(const BlockLayout& layout, const float* a, const float* b);
+
+/// out = value − offset in the active voxels, 0 in the others. The tree has the layout's leaves.
+void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out);
+
+/// Writes value + offset into the active voxels of the layout's leaves of the tree.
+void store(const BlockLayout& layout, const float* bricks, float offset, openvdb::FloatTree& tree);
+
+}  // namespace vdbgeo::stencil

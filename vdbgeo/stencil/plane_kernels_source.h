@@ -1,0 +1,131 @@
+// The loops themselves. Included by one source file for each kind of CPU, compiled for it, with
+// VDBGEO_KERNELS the name of the set. Nothing here may instantiate a template or an inline function from
+// elsewhere: the linker would keep one copy of it, perhaps the one for the newest CPU.
+#include "vdbgeo/stencil/plane_kernels.h"
+
+namespace vdbgeo::stencil {
+namespace {
+
+/// The rows of a range that have active voxels, cut to whole vectors.
+#define VDBGEO_FOR_ROWS(range, y, z0, z1)                                           \
+    for (int y = (range).y_begin; y < (range).y_end; ++y)                           \
+        if (const int z0 = (range).spans[y].begin / lanes * lanes,                  \
+            z1 = (range).spans[y].end;                                              \
+            z0 < z1)
+
+/// `ivdep` is true: the arrays written to are read at the same place only.
+#define VDBGEO_FOR_LANES(z, z0, z1)                             \
+    for (std::ptrdiff_t block = z0; block < z1; block += lanes) \
+        _Pragma("GCC ivdep") for (std::ptrdiff_t z = block; z < block + lanes; ++z)
+
+/// Coefficient of the face between two voxels, twice: 0 where one is not active.
+inline float face(float a, float b) {
+    const float sum = a + b;
+    return sum > 0.0f ? sum : 0.0f;
+}
+
+inline float if_active(float d, float difference) { return d >= 0.0f ? difference : 0.0f; }
+
+void laplacian(const PlaneRange& range, const Planes& u, const Planes& d, const float weight[3], float* result) {
+    const float wx = weight[0], wy = weight[1], wz = weight[2];
+    VDBGEO_FOR_ROWS(range, y, z0, z1) {
+        const std::ptrdiff_t o = y * range.stride, up = o + range.stride, down = o - range.stride;
+        const float* const c = u.here;
+        const float* const m = d.here;
+        float* __restrict const out = result;
+        VDBGEO_FOR_LANES(z, z0, z1) {
+            const float v = c[o + z];
+            const float x = if_active(d.before[o + z], v - u.before[o + z]) +
+                            if_active(d.after[o + z], v - u.after[o + z]);
+            const float yy = if_active(m[down + z], v - c[down + z]) + if_active(m[up + z], v - c[up + z]);
+            const float zz = if_active(m[o + z - 1], v - c[o + z - 1]) +
+                             if_active(m[o + z + 1], v - c[o + z + 1]);
+            out[o + z] = if_active(m[o + z], (wx * x + wy * yy) + wz * zz);
+        }
+    }
+}
+
+/// The sum of a voxel's fluxes, weighted by axis. o: offset of the voxel.
+inline float flux_at(const Planes& w, const Planes& d, std::ptrdiff_t o, std::ptrdiff_t stride, float wx, float wy,
+                     float wz) {
+    const float v = w.here[o], e = d.here[o];
+    const float x = face(e, d.before[o]) * (w.before[o] - v) + face(e, d.after[o]) * (w.after[o] - v);
+    const float y = face(e, d.here[o - stride]) * (w.here[o - stride] - v) +
+                    face(e, d.here[o + stride]) * (w.here[o + stride] - v);
+    const float z = face(e, d.here[o - 1]) * (w.here[o - 1] - v) + face(e, d.here[o + 1]) * (w.here[o + 1] - v);
+    return (wx * x + wy * y) + wz * z;
+}
+
+void flux(const PlaneRange& range, const Planes& w_in, const Planes& d_in, const float weight[3], bool add,
+          float* result) {
+    const Planes w = w_in, d = d_in;
+    const float wx = weight[0], wy = weight[1], wz = weight[2];
+    const std::ptrdiff_t stride = range.stride;
+    VDBGEO_FOR_ROWS(range, y, z0, z1) {
+        float* __restrict const out = result + y * stride;
+        const std::ptrdiff_t o = y * stride;
+        if (add) {
+            VDBGEO_FOR_LANES(z, z0, z1) out[z] += flux_at(w, d, o + z, stride, wx, wy, wz);
+        } else {
+            VDBGEO_FOR_LANES(z, z0, z1) out[z] = flux_at(w, d, o + z, stride, wx, wy, wz);
+        }
+    }
+}
+
+/// here − next is 0 where nothing changes, so constant regions stay what they are to the last bit.
+#define VDBGEO_STEP(extra)                                                                                 \
+    VDBGEO_FOR_LANES(z, z0, z1)                                                                            \
+        next[z] += a * (here[z] - next[z]) + (flux_at(w, d, o + z, stride, wx, wy, wz) extra);
+
+void step(const PlaneRange& range, const StepPlane& s) {
+    const Planes w = s.w, d = s.d;
+    const float wx = s.weight[0], wy = s.weight[1], wz = s.weight[2], a = s.relaxation, f = s.fidelity;
+    const std::ptrdiff_t stride = range.stride;
+    VDBGEO_FOR_ROWS(range, y, z0, z1) {
+        const std::ptrdiff_t o = y * stride;
+        const float* const here = s.here + o;
+        float* __restrict const next = s.next + o;
+        const float *const more = s.gathered + (s.gathered ? o : 0), *const target = s.target + (s.target ? o : 0);
+        if (s.gathered && s.target) {
+            VDBGEO_STEP(+more[z] + f * (target[z] - here[z]))
+        } else if (s.gathered) {
+            VDBGEO_STEP(+more[z])
+        } else if (s.target) {
+            VDBGEO_STEP(+f * (target[z] - here[z]))
+        } else {
+            VDBGEO_STEP()
+        }
+    }
+}
+
+/// e^x for −40 ≤ x ≤ 0, smaller x as −40: relative error below 3e-7. 2^n · 2^f with |f| ≤ ½, 2^f by its
+/// Taylor series to the sixth power.
+inline float exponential(float x) {
+    const float y = (x < -40.0f ? -40.0f : x) * 1.44269504f;
+    const float shifted = y + 12582912.0f;  // 1.5 · 2^23: rounds to an integer in the low bits
+    const float n = shifted - 12582912.0f, g = (y - n) * 0.693147181f;
+    const float p =
+        1.0f +
+        g * (1.0f +
+             g * (0.5f + g * (0.166666667f + g * (0.0416666667f + g * (0.00833333333f + g * 0.00138888889f)))));
+    union {
+        float value;
+        std::int32_t bits;
+    } scale;
+    scale.bits = (static_cast<std::int32_t>(n) + 127) << 23;
+    return p * scale.value;
+}
+
+void edge_stopping(std::size_t n, const float* __restrict gradient2, const float* __restrict variance, float d0,
+                   float* __restrict out) {
+    for (std::size_t i = 0; i < n; ++i) out[i] = d0 * exponential(gradient2[i] * -0.5f / variance[i]);
+}
+
+}  // namespace
+
+extern const Kernels VDBGEO_KERNELS;
+#define VDBGEO_TEXT(name) #name
+#define VDBGEO_NAME(name) VDBGEO_TEXT(name)
+const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, edge_stopping};
+
+}  // namespace vdbgeo::stencil

@@ -1,0 +1,150 @@
+#include "vdbgeo/stencil/tile_gather.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "vdbgeo/stencil/block_field.h"
+
+namespace vdbgeo::stencil {
+namespace {
+
+constexpr int dim = 8;
+
+/// Rounds to minus infinity.
+constexpr int floor_div(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
+
+void copy_row(const float* from, float* to) { std::memcpy(to, from, dim * sizeof(float)); }
+
+}  // namespace
+
+int TileGather::parts(int leaves, int halo, Part* out) {
+    int n = 0;
+    for (int l = -((halo + dim - 1) / dim); l * dim < leaves * dim + halo; ++l) {
+        const int from = std::max(l * dim, -halo), to = std::min((l + 1) * dim, leaves * dim + halo);
+        out[n++] = {l, from - l * dim, to - l * dim, from + halo};
+    }
+    return n;
+}
+
+TileGather::TileGather(const BlockLayout& layout, BlockLayout::Run run, int halo)
+    : layout_(layout), run_(run), halo_(halo), stride_(stride_of(halo)) {
+    const auto& first = layout.cells()[static_cast<std::size_t>(run.first)];
+    origin_ = first.origin;
+    x_begin_ = origin_.x();
+    x_end_ = x_begin_ + (run.last - run.first) * BlockLayout::size_x;
+    y_count_ = parts(BlockLayout::leaves_y, halo, y_);
+    z_count_ = parts(BlockLayout::leaves_z, lead_of(halo), z_);
+}
+
+void TileGather::find_bricks(int layer, std::int32_t* to) const {
+    const int cell_x = std::clamp(floor_div(layer * dim - x_begin_, BlockLayout::size_x), -1, run_.last - run_.first);
+    // The run's cell next to it: neighbours of the cells at the ends reach beyond the run.
+    const int base = std::clamp(cell_x, 0, run_.last - run_.first - 1);
+    const auto& cell = layout_.cells()[static_cast<std::size_t>(run_.first + base)];
+    const int lx = layer & (BlockLayout::leaves_x - 1);
+    const BlockLayout::Cell* around[3][3];
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) around[dy + 1][dz + 1] = layout_.neighbor(cell, cell_x - base, dy, dz);
+    for (int j = 0; j < y_count_; ++j)
+        for (int k = 0; k < z_count_; ++k, ++to) {
+            const int ly = y_[j].leaf, lz = z_[k].leaf;
+            const int dy = floor_div(ly, BlockLayout::leaves_y), dz = floor_div(lz, BlockLayout::leaves_z);
+            const BlockLayout::Cell* c = around[dy + 1][dz + 1];
+            const int slot = (lx * BlockLayout::leaves_y + ly - dy * BlockLayout::leaves_y) * BlockLayout::leaves_z +
+                             lz - dz * BlockLayout::leaves_z;
+            *to = c ? c->bricks[static_cast<std::size_t>(slot)] : BlockLayout::none;
+        }
+}
+
+void TileGather::move_to(int x) {
+    x_ = x;
+    const int layer = floor_div(x, dim), count = y_count_ * z_count_;
+    if (layer == layer_) return;
+    if (layer == layer_ + 1)
+        std::copy_n(next_bricks_, count, bricks_);
+    else
+        find_bricks(layer, bricks_);
+    find_bricks(layer + 1, next_bricks_);
+    layer_ = layer;
+    leaves_here_ = 0;
+    all_full_ = true;
+    for (int i = 0; i < count; ++i) {
+        leaves_here_ += bricks_[i] != BlockLayout::none;
+        all_full_ = all_full_ && bricks_[i] != BlockLayout::none && layout_.full(static_cast<std::size_t>(bricks_[i]));
+    }
+}
+
+template <class Body>
+void TileGather::for_leaves(const Body& body) const {
+    const std::int32_t* brick = bricks_;
+    for (int j = 0; j < y_count_; ++j)
+        for (int k = 0; k < z_count_; ++k, ++brick) body(*brick, y_[j], z_[k]);
+}
+
+void TileGather::copy(const float* bricks, float absent, float* plane) const {
+    const int in_leaf = x_ & (dim - 1);
+    // Reading is bound by latency: ask for what the next plane needs.
+    const std::int32_t* const soon = in_leaf < dim - 1 ? bricks_ : next_bricks_;
+    const std::size_t soon_at = static_cast<std::size_t>(((in_leaf + 1) & (dim - 1)) * dim * dim);
+    std::size_t i = 0;
+    for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
+        if (const std::int32_t n = soon[i++]; n != BlockLayout::none) {
+            const float* p = bricks + static_cast<std::size_t>(n) * BlockField::brick_size + soon_at;
+            for (int r = y.from / 2 * 2; r < y.to; r += 2) __builtin_prefetch(p + r * dim);
+        }
+        float* to = plane + y.at * stride_ + z.at;
+        if (brick == BlockLayout::none) {
+            for (int r = y.from; r < y.to; ++r, to += stride_) std::fill_n(to, dim, absent);
+            return;
+        }
+        const float* from =
+            bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + (in_leaf * dim + y.from) * dim;
+        for (int r = y.from; r < y.to; ++r, to += stride_, from += dim) copy_row(from, to);
+    });
+}
+
+void TileGather::activity(float on, float off, float* plane) const {
+    for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
+        float* to = plane + y.at * stride_ + z.at;
+        if (brick == BlockLayout::none || layout_.full(static_cast<std::size_t>(brick))) {
+            for (int r = y.from; r < y.to; ++r, to += stride_)
+                std::fill_n(to, dim, brick == BlockLayout::none ? off : on);
+            return;
+        }
+        const std::uint64_t word = layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
+        for (int r = y.from; r < y.to; ++r, to += stride_)
+            for (int i = 0; i < dim; ++i) to[i] = word >> (r * dim + i) & 1 ? on : off;
+    });
+}
+
+void TileGather::spans(RowSpan* spans) const {
+    const auto all = static_cast<std::int16_t>(BlockLayout::size_z + 2 * lead_of(halo_));
+    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = all_full_ ? RowSpan{0, all} : RowSpan{all, 0};
+    if (all_full_) return;
+    for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
+        if (brick == BlockLayout::none) return;
+        const std::uint64_t word = layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
+        for (int r = y.from; r < y.to; ++r) {
+            const unsigned bits = static_cast<unsigned>(word >> (r * dim)) & 0xff;
+            if (!bits) continue;
+            RowSpan& s = spans[y.at + r - y.from];
+            const auto begin = static_cast<std::int16_t>(z.at + __builtin_ctz(bits));
+            const auto end = static_cast<std::int16_t>(z.at + 32 - __builtin_clz(bits));
+            s.begin = std::min(s.begin, begin);
+            s.end = std::max(s.end, end);
+        }
+    });
+}
+
+void TileGather::scatter(const float* plane, float* bricks) const {
+    const int in_leaf = (x_ & (dim - 1)) * dim * dim;
+    for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
+        if (brick == BlockLayout::none) return;
+        if (y.leaf < 0 || y.leaf >= BlockLayout::leaves_y || z.leaf < 0 || z.leaf >= BlockLayout::leaves_z) return;
+        const float* from = plane + y.at * stride_ + z.at;
+        float* to = bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + in_leaf;
+        for (int r = 0; r < dim; ++r, from += stride_, to += dim) copy_row(from, to);
+    });
+}
+
+}  // namespace vdbgeo::stencil

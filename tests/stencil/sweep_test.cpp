@@ -221,7 +221,7 @@ TEST_P(SweepOn, AgreesWithTheOracle) {
         for (std::size_t i = 0; i < values.size(); ++i)
             EXPECT_LT(
                 test::largest_difference(setting.layout(), values[i].data(), setting.oracle(), expected[i]),
-                2e-5)
+                2e-6)
                 << "field " << i;
     }
 }
@@ -265,7 +265,7 @@ TEST(Sweep, KnowsNoTileBorders) {
         const auto values = setting.run();
         EXPECT_LT(test::largest_difference(setting.layout(), values[0].data(), setting.oracle(),
                                            setting.expected()[0]),
-                  2e-5);
+                  2e-6);
     }
 }
 

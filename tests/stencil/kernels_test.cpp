@@ -172,10 +172,15 @@ TEST(Kernels, EdgeStoppingIsTheExponential) {
         gradient2.push_back(static_cast<float>(1e-3 * i));
         variance.push_back(static_cast<float>(0.05 + 0.001 * (i % 97)));
     }
-    std::vector<float> out(gradient2.size());
+    std::vector<float> out(gradient2.size()), active(gradient2.size(), 1.0f);
+    active[11] = 0;
     for (const Kernels* k : available_kernels()) {
-        k->edge_stopping(out.size(), gradient2.data(), variance.data(), 2.5f, out.data());
+        k->edge_stopping(out.size(), gradient2.data(), variance.data(), active.data(), 2.5f, out.data());
         for (std::size_t i = 0; i < out.size(); ++i) {
+            if (active[i] == 0) {
+                EXPECT_EQ(out[i], inactive);
+                continue;
+            }
             const double x = -gradient2[i] / (2.0 * variance[i]);
             // The rounding of x to float counts where it is large.
             EXPECT_NEAR(out[i], 2.5 * std::exp(std::max(x, -40.0)),
@@ -197,7 +202,8 @@ TEST(Kernels, AllSetsGiveTheSameBits) {
             if (what == 1) k.flux(in.range(), in.planes(in.u), in.planes(in.d), weight, false, out);
             if (what == 2) k.flux(in.range(), in.planes(in.u), in.planes(in.d), weight, true, out);
             if (what >= 3 && what < 7) k.step(in.range(), step_of(in, (what - 3) & 1, (what - 3) & 2));
-            if (what == 7) k.edge_stopping(rows * stride - 3, in.d[0].data(), in.d[2].data(), 0.3f, out);
+            if (what == 7)
+                k.edge_stopping(rows * stride - 3, in.d[0].data(), in.d[2].data(), in.u[2].data(), 0.3f, out);
         };
         for (int what = 0; what < 8; ++what) {
             Input a(seed);
@@ -213,6 +219,109 @@ TEST(Kernels, AllSetsGiveTheSameBits) {
                 EXPECT_EQ(std::memcmp(in.extra[1].data(), expected.extra[1].data(), bytes), 0)
                     << k->name << ", kernel " << what;
             }
+        }
+    }
+}
+
+/// 1 where active, 0 elsewhere.
+void to_activity(Input& in) {
+    for (Plane& p : in.d)
+        for (std::ptrdiff_t i = 0; i < rows * stride; ++i) p.data()[i] = p.data()[i] >= 0 ? 1.0f : 0.0f;
+}
+
+constexpr float scale[3] = {1, 0.5f, 0.25f};
+
+TEST(Kernels, GradientTakesTheOwnValueForWhatIsMissing) {
+    for (const Kernels* k : available_kernels())
+        for (const bool components : {true, false}) {
+            Input in(5);
+            to_activity(in);
+            float* g[3] = {in.extra[0].data(), in.extra[1].data(), in.extra[2].data()};
+            k->gradient(in.range(), in.planes(in.u), in.planes(in.d), scale, components ? g : nullptr,
+                        in.extra[3].data());
+            for (int y = 1; y < rows - 1; ++y)
+                for (std::ptrdiff_t z = in.spans[static_cast<std::size_t>(y)].begin;
+                     z < in.spans[static_cast<std::size_t>(y)].end; ++z) {
+                    const std::ptrdiff_t o = y * stride + z;
+                    const double v = in.u[1].data()[o];
+                    const auto at = [&](std::size_t plane, std::ptrdiff_t i) {
+                        return in.d[plane].data()[i] > 0 ? static_cast<double>(in.u[plane].data()[i]) : v;
+                    };
+                    const bool on = in.d[1].data()[o] > 0;
+                    const double expected[3] = {on * (at(2, o) - at(0, o)) / 2,
+                                                on * (at(1, o + stride) - at(1, o - stride)) / 4,
+                                                on * (at(1, o + 1) - at(1, o - 1)) / 8};
+                    double square = 0;
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        square += expected[c] * expected[c];
+                        if (components) {
+                            EXPECT_NEAR(g[c][o], expected[c], 3e-7) << k->name;
+                        }
+                    }
+                    EXPECT_NEAR(in.extra[3].data()[o], square, 6e-7) << k->name;
+                }
+        }
+}
+
+TEST(Kernels, WindowSumsAndVariances) {
+    constexpr std::size_t n = 4 * lanes;
+    Input in(6);
+    const float* row = in.u[1].data() + stride;
+    for (const Kernels* k : available_kernels())
+        for (const int r : {1, 2, 8}) {
+            std::vector<double> sum(n), square(n), total(n), count(n, 2.0 * r + 1);
+            k->window_sum(n, r, row, false, sum.data());
+            k->window_sum(n, r, row, true, square.data());
+            const double* const three[] = {sum.data(), square.data(), sum.data()};
+            k->sum_rows(n, 3, three, total.data());
+            std::vector<float> variance(n);
+            const double* const sums[] = {sum.data()};
+            k->variance(n, count.data(), square.data(), sums, 1, 2.0f, 0.1f, variance.data());
+            for (std::size_t i = 0; i < n; ++i) {
+                double s = 0, s2 = 0;
+                for (int j = -r; j <= r; ++j) {
+                    const double v = row[static_cast<std::ptrdiff_t>(i) + j];
+                    s += v;
+                    s2 += v * v;
+                }
+                EXPECT_NEAR(sum[i], s, 1e-12) << k->name;
+                EXPECT_NEAR(square[i], s2, 1e-12) << k->name;
+                EXPECT_NEAR(total[i], 2 * s + s2, 1e-12) << k->name;
+                const double mean = s / count[i];
+                EXPECT_NEAR(variance[i], std::max(0.1, 2 * (s2 / count[i] - mean * mean)), 1e-6) << k->name;
+            }
+        }
+}
+
+TEST(Kernels, AllSetsGiveTheSameBitsOfWindows) {
+    constexpr std::size_t n = 6 * lanes;
+    for (std::uint64_t seed = 50; seed < 70; ++seed) {
+        std::vector<float> first;
+        std::vector<double> first_sums;
+        for (const Kernels* k : available_kernels()) {
+            Input in(seed);
+            to_activity(in);
+            float* g[3] = {in.extra[0].data(), in.extra[1].data(), in.extra[2].data()};
+            k->gradient(in.range(), in.planes(in.u), in.planes(in.d), scale, g, in.extra[3].data());
+            std::vector<float> out;
+            for (Plane& p : in.extra) out.insert(out.end(), p.data(), p.data() + rows * stride);
+            std::vector<double> sums(4 * n);
+            const float* row = in.u[0].data() + 2 * stride;
+            k->window_sum(n, 3, row, false, sums.data());
+            k->window_sum(n, 3, row, true, sums.data() + n);
+            const double* const both[] = {sums.data(), sums.data() + n, sums.data()};
+            k->sum_rows(n, 3, both, sums.data() + 2 * n);
+            std::fill_n(sums.data() + 3 * n, n, 7.0);
+            std::vector<float> variance(n);
+            k->variance(n, sums.data() + 3 * n, sums.data() + n, both, 3, 1.3f, 1e-3f, variance.data());
+            out.insert(out.end(), variance.begin(), variance.end());
+            if (first.empty()) {
+                first = out;
+                first_sums = sums;
+            }
+            EXPECT_EQ(std::memcmp(out.data(), first.data(), out.size() * sizeof(float)), 0) << k->name;
+            EXPECT_EQ(std::memcmp(sums.data(), first_sums.data(), sums.size() * sizeof(double)), 0)
+                << k->name;
         }
     }
 }

@@ -75,12 +75,13 @@ class Oracle {
         for (; q > 0; --q) u = flux(u, Values(size(), 1.0));
         return u;
     }
-    /// Central differences, a missing neighbour having the voxel's own value.
+    /// Central differences times √w_a, a missing neighbour having the voxel's own value.
     Vec3d gradient(const Values& u, std::size_t i) const {
         const auto at = [&](std::size_t f) {
             return near_[i][f] == none ? u[i] : u[static_cast<std::size_t>(near_[i][f])];
         };
-        return {(at(1) - at(0)) / 2, (at(3) - at(2)) / 2, (at(5) - at(4)) / 2};
+        const Vec3d difference(at(1) - at(0), at(3) - at(2), at(5) - at(4));
+        return 0.5 * difference.cwiseProduct(weights_.cwiseSqrt());
     }
     /// d of Eqs 3 and 4.
     Values diffusivity(const Values& u, const DiffusionTerm& term, const EdgeScale& scale) const {

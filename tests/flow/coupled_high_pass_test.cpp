@@ -144,7 +144,7 @@ TEST(HighPass, CosineModesComeToTheMatrixExponential) {
 
 TEST(HighPass, OfEqualDiffusionsAndOfConstantsIsZero) {
     for (HighPassOptions o : cases()) {
-        const auto grid = test::sparse_grid("cells", 3);
+        const auto grid = test::sparse_grid("few leaves", 3);
         o.slow = o.fast;
         o.coupling_v = o.coupling_u;
         coupled_high_pass(*grid, o);
@@ -159,7 +159,7 @@ TEST(HighPass, OfEqualDiffusionsAndOfConstantsIsZero) {
 TEST(HighPass, StrongCouplingSynchronises) {
     double before = std::numeric_limits<double>::infinity();
     for (const double coupling : {0.01, 1.0, 100.0, 10000.0}) {
-        const auto grid = test::sparse_grid("few leaves", 4);
+        const auto grid = test::sparse_grid("inside a leaf", 4);
         HighPassOptions o;
         o.coupling_u = o.coupling_v = coupling;
         o.time = 1;

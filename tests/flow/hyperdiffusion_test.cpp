@@ -104,7 +104,7 @@ TEST(Hyperdiffusion, CyclesComeToTheHeatEquation) {
         HyperdiffusionOptions o;
         o.terms = {{q, 1.0}};
         o.sigma = no_edges;
-        o.time = 0.5 / std::pow(box.modes[1].eigenvalue(), q + 1);
+        o.time = 0.5 / std::pow(box.modes[2].eigenvalue(), q + 1);
         o.min_cycles = 40;
         const auto grid = box.grid();
         const HyperdiffusionReport report = hyperdiffuse(*grid, o);
@@ -196,7 +196,9 @@ TEST_P(HyperdiffusionOn, AgreesWithTheOracle) {
         EXPECT_TRUE(test::inactive_untouched(*grid));
         EXPECT_EQ(report.active_voxels, oracle.size());
         EXPECT_GE(report.cycles, c.options.min_cycles);
-        if (c.options.time) EXPECT_NEAR(report.time, *c.options.time, 1e-9 * report.time);
+        if (c.options.time) {
+            EXPECT_NEAR(report.time, *c.options.time, 1e-9 * report.time);
+        }
         double removed = 0;
         for (std::size_t i = 0; i < expected.size(); ++i)
             removed += std::pow(expected[i] - oracle.input()[i], 2);
@@ -245,15 +247,13 @@ double move_error(const openvdb::FloatGrid& input, const HyperdiffusionOptions& 
 }
 
 TEST(Hyperdiffusion, MovesWithTheGrid) {
-    for (const std::string kind : {"leaf corner", "cells"}) {
-        const auto input = test::sparse_grid(kind, 3);
-        for (const HyperdiffusionOptions& o : typical()) {
-            for (int i = 1; i <= 7; ++i)
-                EXPECT_LT(move_error(*input, o, [i](const Coord& c) { return c.offsetBy(i, 8 - i, 2 * i); }),
-                          2e-6);
-            EXPECT_LT(move_error(*input, o, [](const Coord& c) { return c.offsetBy(-1000, 77, 65536); }),
+    const auto corner = test::sparse_grid("leaf corner", 3), cells = test::sparse_grid("cells", 3);
+    for (const HyperdiffusionOptions& o : typical()) {
+        for (int i = 1; i <= 7; ++i)
+            EXPECT_LT(move_error(*corner, o, [i](const Coord& c) { return c.offsetBy(i, 8 - i, 2 * i); }),
                       2e-6);
-        }
+        EXPECT_LT(move_error(*cells, o, [](const Coord& c) { return c.offsetBy(3, 5, 7); }), 2e-6);
+        EXPECT_LT(move_error(*cells, o, [](const Coord& c) { return c.offsetBy(-1000, 77, 65536); }), 2e-6);
     }
 }
 
@@ -322,7 +322,9 @@ TEST(Hyperdiffusion, KeepsTheMeanOverAThousandSteps) {
     for (const Stepper stepper : {Stepper::euler, Stepper::fsi})
         for (const int q : {0, 1, 2})
             for (const Kind kind : {Kind::infinite, Kind::local}) {
-                const auto grid = rescaled(test::sparse_grid("few leaves", 8), 1, 2);
+                // Euler evaluates the coefficients a thousand times: a small grid.
+                const bool slow = stepper == Stepper::euler && kind == Kind::local;
+                const auto grid = rescaled(test::sparse_grid(slow ? "inside a leaf" : "few leaves", 8), 1, 2);
                 HyperdiffusionOptions o;
                 o.terms = {{q, 1.0}};
                 o.sigma.kind = kind;

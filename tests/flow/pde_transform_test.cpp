@@ -34,18 +34,20 @@ Modes transform(const openvdb::FloatGrid& grid, const TransformOptions& options)
 }
 
 std::vector<TransformOptions> cases() {
-    TransformOptions three, orders, edges, euler;
+    TransformOptions two, orders, edges, euler;
+    two.passes = edges.passes = {{1, 1.0}, {1, 6.0}};
     orders.passes = {{0, 0.3}, {3, 0.01}, {2, 1}, {0, 5}};
     edges.sigma = {};
     euler.passes = {{1, 0.05}, {0, 1}};
     euler.stepper = Stepper::euler;
-    return {three, orders, edges, euler};
+    return {two, orders, edges, euler};
 }
 
 TEST(PdeTransform, ModesAndResidueAddUpToTheInput) {
     for (const std::string& kind : test::sparse_kinds())
         for (const TransformOptions& o : cases())
             for (const double scale : {1.0, 1e-8, 1e8}) {
+                if (scale != 1 && kind != "leaf corner") continue;
                 const auto input = test::sparse_grid(kind, 51);
                 for (auto it = input->beginValueOn(); it; ++it)
                     it.setValue(static_cast<float>((*it + 0.5) * scale));

@@ -89,9 +89,9 @@ inline openvdb::FloatGrid::Ptr sparse_grid(const std::string& kind, std::uint64_
         for (int i = 0; i < 40; ++i)
             make.leaf(Coord(8 * (make.below(10) - 5), 8 * (make.below(12) - 5), 8 * (make.below(6) - 3)));
     if (kind == "shell")
-        for (auto c = openvdb::CoordBBox(Coord(-22), Coord(22)).begin(); c; ++c) {
+        for (auto c = openvdb::CoordBBox(Coord(-14), Coord(14)).begin(); c; ++c) {
             const double r = (*c).asVec3d().length();
-            if (r > 16.5 && r < 20.5) make.set(*c);
+            if (r > 9.5 && r < 13) make.set(*c);
         }
     if (kind == "far apart")
         for (int i = 0; i < 6; ++i) {

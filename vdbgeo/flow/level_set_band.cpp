@@ -76,7 +76,7 @@ class NearestPoint {
     /// Newton's method: onto the zero level along the gradient, and across it to below the voxel.
     Nearest follow(const Vec3d& from, Vec3d at) const {
         constexpr int most = 16;
-        constexpr double on_level = 1e-8, below = 1e-3, nearly_below = 0.2;
+        constexpr double on_level = 3e-4, below = 1e-3, nearly_below = 0.2;
         Nearest out;
         for (int i = 0; i <= most; ++i) {
             const ValueAndGradient v = smooth_value(phi_, at);
@@ -85,10 +85,10 @@ class NearestPoint {
             const Vec3d gap = from - at;
             const Vec3d across = gap - gap.dot(v.gradient) / g2 * v.gradient;
             const bool on = std::abs(v.value) < on_level * std::sqrt(g2);
-            // Along the normal, the distance errs by the square of what is left across, times the curvature.
+            // What is left along the gradient is added; what is left across counts squared, times the curvature.
             if (on && across.norm() < (i < most ? below : nearly_below)) {
                 out.found = true;
-                out.distance = std::abs(gap.dot(v.gradient)) / std::sqrt(g2);
+                out.distance = std::abs(gap.dot(v.gradient) + v.value) / std::sqrt(g2);
                 out.normal = v.gradient / std::sqrt(g2);
                 return out;
             }
@@ -262,11 +262,11 @@ SurfaceBand::Measures SurfaceBand::measures() const {
     return {static_cast<double>(inside_) + sums.volume, sums.area};
 }
 
-void SurfaceBand::write(FloatGrid& level_set) const {
+void SurfaceBand::write(FloatGrid& level_set, double half_width) const {
     const double voxel = level_set.voxelSize()[0];
-    const float width = level_set.background();
+    const auto width = static_cast<float>(half_width);
     if (vanished_) {
-        level_set.tree().clear();
+        level_set.setTree(std::make_shared<FloatTree>(width));
         return;
     }
     auto tree = std::make_shared<FloatTree>(*tree_);

@@ -45,8 +45,8 @@ class SurfaceBand {
     };
     Measures measures() const;
 
-    /// Writes the surface into a level set: its background, voxel size and band width remain.
-    void write(openvdb::FloatGrid& level_set) const;
+    /// Writes the surface into a level set as distances in world units, `width` on either side.
+    void write(openvdb::FloatGrid& level_set, double width) const;
 
  private:
     void trim();

@@ -24,13 +24,16 @@ constexpr int max_order = 7;
 constexpr double safety = 0.9;
 constexpr int sizes[3] = {BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z};
 
-/// body(at, n) for the rows of the cell, grown by `before` and `after` voxels along each axis: n voxels from `at`.
+/// body(at, n) for the rows of the cell, grown by `before` and `after` voxels along each axis: n voxels from
+/// `at`.
 template <class Body>
-void for_rows(const Tile& t, const std::array<int, 3>& before, const std::array<int, 3>& after, const Body& body) {
+void for_rows(const Tile& t, const std::array<int, 3>& before, const std::array<int, 3>& after,
+              const Body& body) {
     for (int x = -before[0]; x < sizes[0] + after[0]; ++x)
         for (int y = -before[1]; y < sizes[1] + after[1]; ++y) {
             const stencil::RowSpan s = t.span(x, y);
-            const int begin = std::max<int>(s.begin, -before[2]), end = std::min<int>(s.end, sizes[2] + after[2]);
+            const int begin = std::max<int>(s.begin, -before[2]),
+                      end = std::min<int>(s.end, sizes[2] + after[2]);
             if (begin < end) body(t.at(x, y, begin), static_cast<std::ptrdiff_t>(end - begin));
         }
 }
@@ -103,7 +106,8 @@ class RightSide {
                     float sum = 0;
                     for (std::size_t a = 0; a < 3; ++a) {
                         const std::ptrdiff_t s = steps[a];
-                        sum += weight_[a] * (on[i - s] * (from[i] - from[i - s]) + on[i + s] * (from[i] - from[i + s]));
+                        sum += weight_[a] *
+                               (on[i - s] * (from[i] - from[i - s]) + on[i + s] * (from[i] - from[i + s]));
                     }
                     to[i] = on[i] * sum;
                 }
@@ -113,7 +117,8 @@ class RightSide {
         return from;
     }
 
-    /// Central difference of w along an axis, in units of the scale: in the cell and beside it along the others.
+    /// Central difference of w along an axis, in units of the scale: in the cell and beside it along the
+    /// others.
     void slope(Tile& t, const float* w, std::size_t a, std::ptrdiff_t s) const {
         float* to = t.scratch[2 + a];
         const float* on = t.active;
@@ -182,19 +187,18 @@ class RightSide {
     float per_scale_, fidelity_, pressure_;
 };
 
-/// w_a = (h_min / h_a)².
-Vec3d weights_of(const FloatGrid& grid) {
-    const openvdb::Vec3d h = grid.voxelSize();
-    const double least = std::min({h[0], h[1], h[2]});
-    return {std::pow(least / h[0], 2), std::pow(least / h[1], 2), std::pow(least / h[2], 2)};
-}
-
 class Flow {
  public:
-    Flow(const BlockLayout& layout, const FloatGrid& grid, const GeometricFlowOptions& options)
-        : layout_(layout), options_(options), weights_(weights_of(grid)), right_side_(options, weights_),
-          state_(layout.brick_count()), rate_(layout.brick_count()), input_(layout.brick_count()) {
-        stencil::load(layout, grid.tree(), 0, input_.brick(0));
+    Flow(const BlockLayout& layout, const openvdb::FloatTree& tree, const Vec3d& weights,
+         const GeometricFlowOptions& options)
+        : layout_(layout),
+          options_(options),
+          weights_(weights),
+          right_side_(options, weights),
+          state_(layout.brick_count()),
+          rate_(layout.brick_count()),
+          input_(layout.brick_count()) {
+        stencil::load(layout, tree, 0, input_.brick(0));
         std::copy_n(input_.brick(0), layout.brick_count() * BlockField::brick_size, state_.brick(0));
     }
 
@@ -262,7 +266,8 @@ void GeometricFlowOptions::check() const {
         throw InvalidInput(fmt::format("the scale of a flow is {}, not above 0", scale));
 }
 
-HyperdiffusionReport geometric_flow(FloatGrid& grid, const GeometricFlowOptions& options, const Progress& progress) {
+HyperdiffusionReport geometric_flow(FloatGrid& grid, const GeometricFlowOptions& options,
+                                    const Progress& progress) {
     options.check();
     HyperdiffusionReport report;
     report.active_voxels = grid.activeVoxelCount();
@@ -270,9 +275,7 @@ HyperdiffusionReport geometric_flow(FloatGrid& grid, const GeometricFlowOptions&
     const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree());
     tree->voxelizeActiveTiles();
     const BlockLayout layout(*tree);
-    FloatGrid::Ptr work = FloatGrid::create(tree);
-    work->setTransform(grid.transformPtr());
-    Flow flow(layout, *work, options);
+    Flow flow(layout, *tree, axis_weights(grid.transform()), options);
     report.state_bytes = flow.memory();
     const stencil::FieldSummary before = stencil::summarize(layout, flow.input());
     if (before.non_finite > 0)

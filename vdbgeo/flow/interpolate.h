@@ -11,8 +11,8 @@ namespace vdbgeo {
 
 constexpr float not_a_value = std::numeric_limits<float>::quiet_NaN();
 
-/// An array of which voxel (x, y, z) is at data[x · stride_x + y · stride_y + z]; valid for coordinates low … high
-/// of each axis. NaN where there is no value: what is interpolated from it comes out as NaN.
+/// An array of which voxel (x, y, z) is at data[x · stride_x + y · stride_y + z]; valid for coordinates low …
+/// high of each axis. NaN where there is no value: what is interpolated from it comes out as NaN.
 struct DenseWindow {
     const float* data;
     std::ptrdiff_t stride_x, stride_y;
@@ -47,7 +47,8 @@ struct LagrangeWeights {
     double w[N], d[N];
 };
 
-/// The cell of p, and where in it p is; false where the voxels up to `margin` around it are not in the window.
+/// The cell of p, and where in it p is; false where the voxels up to `margin` around it are not in the
+/// window.
 inline bool find_cell(const DenseWindow& window, const Vec3d& p, int margin, int cell[3], double t[3]) {
     for (int a = 0; a < 3; ++a) {
         if (!(p[a] >= window.low[a] + margin && p[a] < window.high[a] - margin)) return false;
@@ -59,8 +60,8 @@ inline bool find_cell(const DenseWindow& window, const Vec3d& p, int margin, int
 
 }  // namespace detail
 
-/// Value and gradient at p of the polynomial through the N³ voxels around it (Lagrange), of order N. NaN where one
-/// lacks a value.
+/// Value and gradient at p of the polynomial through the N³ voxels around it (Lagrange), of order N. NaN
+/// where one lacks a value.
 template <int N>
 ValueAndGradient lagrange(const DenseWindow& window, const Vec3d& p) {
     ValueAndGradient out;

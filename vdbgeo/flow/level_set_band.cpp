@@ -49,12 +49,14 @@ class NearestPoint {
 
     bool gradient(const int p[3], Vec3d& g) const {
         const float* at = phi_.at(p[0], p[1], p[2]);
-        g = Vec3d(at[phi_.stride_x] - at[-phi_.stride_x], at[phi_.stride_y] - at[-phi_.stride_y], at[1] - at[-1]) / 2;
+        g = Vec3d(at[phi_.stride_x] - at[-phi_.stride_x], at[phi_.stride_y] - at[-phi_.stride_y],
+                  at[1] - at[-1]) /
+            2;
         return g.squaredNorm() > 0.04;  // false for NaN
     }
 
-    /// A point near the zero level: along the gradient, from the voxel itself or, where that is new in the band,
-    /// from the voxel further inside that one comes to by going down |φ|.
+    /// A point near the zero level: along the gradient, from the voxel itself or, where that is new in the
+    /// band, from the voxel further inside that one comes to by going down |φ|.
     bool begin(int x, int y, int z, Vec3d& start) const {
         int p[3] = {x, y, z};
         for (int moves = 0; std::abs(value(p)) > half_width_ - 2 && moves < 4; ++moves) {
@@ -85,7 +87,8 @@ class NearestPoint {
             const Vec3d gap = from - at;
             const Vec3d across = gap - gap.dot(v.gradient) / g2 * v.gradient;
             const bool on = std::abs(v.value) < on_level * std::sqrt(g2);
-            // What is left along the gradient is added; what is left across counts squared, times the curvature.
+            // What is left along the gradient is added; what is left across counts squared, times the
+            // curvature.
             if (on && across.norm() < (i < most ? below : nearly_below)) {
                 out.found = true;
                 out.distance = std::abs(gap.dot(v.gradient) + v.value) / std::sqrt(g2);
@@ -220,7 +223,8 @@ void SurfaceBand::redistance() {
             const Nearest nearest = search.find(x, y, z);
             const double d = nearest.found ? nearest.distance : half_width_ + 2;
             t.out[0][at] = static_cast<float>(phi.data[at] < 0 ? -d : d);
-            for (std::size_t a = 0; a < 3; ++a) t.out[a + 1][at] = static_cast<float>(nearest.normal[static_cast<int>(a)]);
+            for (std::size_t a = 0; a < 3; ++a)
+                t.out[a + 1][at] = static_cast<float>(nearest.normal[static_cast<int>(a)]);
             if (nearest.found) any = true;
         });
     });
@@ -249,7 +253,8 @@ SurfaceBand::Measures SurfaceBand::measures() const {
             for (std::size_t i = begin; i < end; ++i)
                 for (std::size_t x = 0; x < 8; ++x)
                     for (std::uint64_t word = layout_.mask(i)[x]; word; word &= word - 1) {
-                        const double phi = phi_.brick(i)[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
+                        const double phi =
+                            phi_.brick(i)[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
                         s.volume += (4 * inside(phi, narrow) - inside(phi, wide)) / 3;
                         s.area += (4 * delta(phi, narrow) - delta(phi, wide)) / 3;
                     }

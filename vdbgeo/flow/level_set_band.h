@@ -11,8 +11,8 @@
 
 namespace vdbgeo {
 
-/// Signed distances φ (in voxels, negative inside) to a surface, on the voxels nearer to it than `half_width` and
-/// their neighbours, and the normals. Operators move φ; `rebuild` makes distances of it again.
+/// Signed distances φ (in voxels, negative inside) to a surface, on the voxels nearer to it than `half_width`
+/// and their neighbours, and the normals. Operators move φ; `rebuild` makes distances of it again.
 class SurfaceBand {
  public:
     static constexpr int min_half_width = 6, max_half_width = 20;
@@ -20,10 +20,11 @@ class SurfaceBand {
     /// Takes a level set with cubic voxels whose band may be narrower.
     SurfaceBand(const openvdb::FloatGrid& level_set, int half_width);
 
-    /// Moves the band to where the zero level is now, and makes φ the distance to it: for each voxel the nearest
-    /// point of the zero level of the interpolant of order 6, found by Newton's method along the gradient and
-    /// across it (Chopp 2001). Where that does not converge (next to a medial axis, in thin necks) the nearest
-    /// crossing of an edge of the lattice is taken. The zero level may have moved by a voxel since the last time.
+    /// Moves the band to where the zero level is now, and makes φ the distance to it: for each voxel the
+    /// nearest point of the zero level of the interpolant of order 6, found by Newton's method along the
+    /// gradient and across it (Chopp 2001). Where that does not converge (next to a medial axis, in thin
+    /// necks) the nearest crossing of an edge of the lattice is taken. The zero level may have moved by a
+    /// voxel since the last time.
     void rebuild();
 
     bool vanished() const { return vanished_; }
@@ -35,11 +36,12 @@ class SurfaceBand {
         return {normal_[0].brick(0), normal_[1].brick(0), normal_[2].brick(0)};
     }
     int half_width() const { return half_width_; }
-    /// Halo of a tile in which the polynomial at the nearest point of every voxel of the cell can be evaluated.
+    /// Halo of a tile in which the polynomial at the nearest point of every voxel of the cell can be
+    /// evaluated.
     int halo() const { return half_width_ + 5; }
 
-    /// Volume (voxel³) of the inside and area (voxel²) of the surface, from φ being distances: smeared steps of
-    /// two widths, put together such that the mean curvature drops out.
+    /// Volume (voxel³) of the inside and area (voxel²) of the surface, from φ being distances: smeared steps
+    /// of two widths, put together such that the mean curvature drops out.
     struct Measures {
         double volume = 0, area = 0;
     };
@@ -62,7 +64,8 @@ class SurfaceBand {
     std::uint64_t inside_ = 0;  // inactive voxels with φ < 0
 };
 
-/// The field of a tile as a window, with NaN in voxels that are not active, in the tile's scratch array `scratch`.
+/// The field of a tile as a window, with NaN in voxels that are not active, in the tile's scratch array
+/// `scratch`.
 DenseWindow window_of(const stencil::Tile& tile, std::size_t field, std::size_t scratch);
 
 /// body(x, y, z, at) for the active voxels of the tile's cell.

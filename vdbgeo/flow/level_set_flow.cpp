@@ -24,8 +24,8 @@ constexpr double step_length = 0.1;  // voxels that the surface moves in a step
 constexpr double shortest_step = 0.25, longest_step = 256;
 /// Speeds above are cut: radii of a voxel or less, which the lattice does not show.
 constexpr double fastest = step_length / shortest_step;
-/// Splitting constant S over the coefficient of Δ_s². At ½ (Smereka 2003) ripples of two voxels grow slowly, as
-/// on the lattice their discrete Δ² is less than what the interpolated speed answers.
+/// Splitting constant S over the coefficient of Δ_s². At ½ (Smereka 2003) ripples of two voxels grow slowly,
+/// as on the lattice their discrete Δ² is less than what the interpolated speed answers.
 constexpr double splitting = 1;
 constexpr double solve_relative = 1e-2, solve_absolute = 1e-5;  // of the movement; voxels
 
@@ -56,16 +56,17 @@ class Steps {
         const bool willmore = options_.flow == SurfaceFlow::willmore;
         BlockField speed = willmore ? willmore_speed(band_) : surface_diffusion_speed(band_);
         cut(speed);
-        const double unset = std::clamp(step_length / std::max(largest(speed), 1e-30), shortest_step, longest_step);
+        const double unset =
+            std::clamp(step_length / std::max(largest(speed), 1e-30), shortest_step, longest_step);
         const double dt = std::min(left, options_.dt.value_or(unset));
         const double stiffness = willmore ? 0.5 : 1;
         BlockField change;  // of −φ, per time
-        solve_biharmonic(band_.layout(), splitting * stiffness * dt, speed, solve_relative, solve_absolute / dt,
-                         change);
+        solve_biharmonic(band_.layout(), splitting * stiffness * dt, speed, solve_relative,
+                         solve_absolute / dt, change);
         const double most = largest(change) * dt;
         if (!(most <= 1))
-            throw NumericalError(
-                fmt::format("the surface moves {:.3g} voxels in one step of {:.6g}; take a smaller one", most, dt));
+            throw NumericalError(fmt::format(
+                "the surface moves {:.3g} voxels in one step of {:.6g}; take a smaller one", most, dt));
         move(change, -dt);
         ++since_rebuild_;
         rebuild();
@@ -113,9 +114,8 @@ class Steps {
 
 void check_level_set(const FloatGrid& grid) {
     if (grid.getGridClass() != openvdb::GRID_LEVEL_SET)
-        throw InvalidInput(
-            fmt::format("the grid is of class '{}', not a level set",
-                        openvdb::GridBase::gridClassToString(grid.getGridClass())));
+        throw InvalidInput(fmt::format("the grid is of class '{}', not a level set",
+                                       openvdb::GridBase::gridClassToString(grid.getGridClass())));
     if (!grid.transform().isLinear() || !grid.hasUniformVoxels())
         throw InvalidInput("the level set's voxels are not cubic");
     if (!(grid.background() > 0)) throw InvalidInput("the level set's background is not positive");
@@ -131,14 +131,15 @@ void LevelSetFlowOptions::check() const {
     if (dt && !(*dt > 0 && std::isfinite(*dt)))
         throw InvalidInput(fmt::format("the step of a flow is {}, not above 0", *dt));
     if (dt && flow == SurfaceFlow::mean_curvature && *dt > explicit_bound)
-        throw InvalidInput(fmt::format("the step {} is above the bound of mean curvature flow, {:.6g} voxel^2", *dt,
-                                       explicit_bound));
+        throw InvalidInput(fmt::format(
+            "the step {} is above the bound of mean curvature flow, {:.6g} voxel^2", *dt, explicit_bound));
     if (half_width != 0 && (half_width < 2 || half_width > SurfaceBand::max_half_width))
-        throw InvalidInput(fmt::format("half the width of the band is {} voxels, not 2 to {}, or 0", half_width,
-                                       SurfaceBand::max_half_width));
+        throw InvalidInput(fmt::format("half the width of the band is {} voxels, not 2 to {}, or 0",
+                                       half_width, SurfaceBand::max_half_width));
 }
 
-LevelSetFlowReport level_set_flow(FloatGrid& grid, const LevelSetFlowOptions& options, const Progress& progress) {
+LevelSetFlowReport level_set_flow(FloatGrid& grid, const LevelSetFlowOptions& options,
+                                  const Progress& progress) {
     options.check();
     check_level_set(grid);
     LevelSetFlowReport report;
@@ -147,8 +148,10 @@ LevelSetFlowReport level_set_flow(FloatGrid& grid, const LevelSetFlowOptions& op
         return report;
     }
     const int given = static_cast<int>(std::ceil(grid.background() / grid.voxelSize()[0]));
-    const int out = std::min(options.half_width > 0 ? options.half_width : given, SurfaceBand::max_half_width);
-    SurfaceBand band(grid, std::max({out, std::min(given, SurfaceBand::max_half_width), SurfaceBand::min_half_width}));
+    const int out =
+        std::min(options.half_width > 0 ? options.half_width : given, SurfaceBand::max_half_width);
+    SurfaceBand band(
+        grid, std::max({out, std::min(given, SurfaceBand::max_half_width), SurfaceBand::min_half_width}));
     report.volume_before = report.volume_after = band.measures().volume;
     report.active_voxels = grid.activeVoxelCount();
     report.vanished = band.vanished();

@@ -19,9 +19,9 @@ using stencil::Tile;
 constexpr double sharpest = 1;  // principal curvature that the lattice can show, 1/voxel
 
 struct Shape {
-    double rate;      // |∇φ| κ
-    double curvature; // κ = k1 + k2
-    double gaussian;  // K = k1 k2
+    double rate;       // |∇φ| κ
+    double curvature;  // κ = k1 + k2
+    double gaussian;   // K = k1 k2
 };
 
 /// Curvatures of the level set through a voxel (Goldman 2005); NaN where a neighbour is missing.
@@ -36,10 +36,12 @@ Shape shape_at(const DenseWindow& w, std::ptrdiff_t at) {
     const double x = first(X), y = first(Y), z = first(Z);
     const double xx = second(X), yy = second(Y), zz = second(Z);
     const double xy = mixed(X, Y), xz = mixed(X, Z), yz = mixed(Y, Z);
-    const double g2 = x * x + y * y + z * z + 1e-6;  // where φ has a crest, its Laplacian remains (Evans & Spruck)
+    const double g2 =
+        x * x + y * y + z * z + 1e-6;  // where φ has a crest, its Laplacian remains (Evans & Spruck)
     const double along = x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + x * z * xz + y * z * yz);
-    const double adjoint = x * x * (yy * zz - yz * yz) + y * y * (xx * zz - xz * xz) + z * z * (xx * yy - xy * xy) +
-                           2 * (x * y * (xz * yz - xy * zz) + x * z * (xy * yz - xz * yy) + y * z * (xy * xz - yz * xx));
+    const double adjoint =
+        x * x * (yy * zz - yz * yz) + y * y * (xx * zz - xz * xz) + z * z * (xx * yy - xy * xy) +
+        2 * (x * y * (xz * yz - xy * zz) + x * z * (xy * yz - xz * yy) + y * z * (xy * xz - yz * xx));
     Shape s;
     s.rate = xx + yy + zz - along / g2;
     s.curvature = s.rate / std::sqrt(g2);
@@ -65,7 +67,8 @@ BlockField from_shapes(const SurfaceBand& band, const Body& body) {
     return out;
 }
 
-/// field(nearest point of the surface) at each voxel; `only_missing`: where the field has no value of its own.
+/// field(nearest point of the surface) at each voxel; `only_missing`: where the field has no value of its
+/// own.
 BlockField extend(const SurfaceBand& band, const BlockField& field, bool only_missing = false) {
     BlockField out(band.layout().brick_count());
     const auto n = band.normal();
@@ -89,7 +92,8 @@ BlockField extend(const SurfaceBand& band, const BlockField& field, bool only_mi
 }
 
 /// factor · Δ(field) + other, NaN where a neighbour is missing.
-BlockField laplacian_plus(const BlockLayout& layout, const BlockField& field, float factor, const BlockField* other) {
+BlockField laplacian_plus(const BlockLayout& layout, const BlockField& field, float factor,
+                          const BlockField* other) {
     BlockField out(layout.brick_count());
     stencil::TileFields fields;
     fields.in = {field.brick(0)};
@@ -177,7 +181,10 @@ BlockField willmore_speed(const SurfaceBand& band) {
         const double h = s.curvature / 2;
         // H² − K = ((k1 − k2)/2)². A NaN has to stay one.
         const double difference = h * h - s.gaussian;
-        return 2 * h * (difference < 0 ? 0 : difference > sharpest * sharpest ? sharpest * sharpest : difference);
+        return 2 * h *
+               (difference < 0                     ? 0
+                : difference > sharpest * sharpest ? sharpest * sharpest
+                                                   : difference);
     });
     return extend(band, laplacian_plus(band.layout(), curvature, 0.5f, &bending));
 }
@@ -213,7 +220,8 @@ int solve_biharmonic(const BlockLayout& layout, double a, const BlockField& righ
         for_floats(delta, [=](std::size_t k) { p[k] = r[k] + keep * p[k]; });
         now = next;
     }
-    throw NumericalError(fmt::format("the implicit step was not solved to {} in {} iterations", tolerance, most));
+    throw NumericalError(
+        fmt::format("the implicit step was not solved to {} in {} iterations", tolerance, most));
 }
 
 double largest(const BlockField& field) {

@@ -62,10 +62,43 @@ std::string fallback(const std::vector<std::string>& numbers) {
     return fmt::format(" [{}]", fmt::join(numbers, ","));
 }
 
-/// Low-passes of growing time from one list of orders and one of times.
-void set_passes(const std::vector<int>& orders, const std::vector<double>& times, TransformOptions& options) {
-    options.passes.clear();
-    for (std::size_t i = 0; i < times.size(); ++i) options.passes.push_back({orders[i], times[i]});
+std::vector<TransformOptions::Pass> make_passes(const std::vector<int>& orders,
+                                                const std::vector<double>& times) {
+    const auto q = spread("--orders", orders, "--times", times.size());
+    std::vector<TransformOptions::Pass> passes;
+    for (std::size_t i = 0; i < times.size(); ++i) passes.push_back({q[i], times[i]});
+    return passes;
+}
+
+/// Two low-passes, between which the band lies: times of passes behind each other add up.
+std::vector<TransformOptions::Pass> parse_band(const std::string& text, int order) {
+    const char* what = "LOW:HIGH, two times with 0 <= LOW < HIGH";
+    const auto fail = [&] { return UsageError(fmt::format("--band-pass: '{}' is not {}", text, what)); };
+    const std::size_t colon = text.find(':');
+    if (colon == std::string::npos) throw fail();
+    const double low = parse_number("--band-pass", text.substr(0, colon), what),
+                 high = parse_number("--band-pass", text.substr(colon + 1), what);
+    if (!(low >= 0 && low < high)) throw fail();
+    return make_passes({order}, {low, high - low});
+}
+
+/// "1,3" or "2,residue" of `modes` modes, behind which the residue comes.
+std::vector<bool> parse_kept(const std::string& text, std::size_t modes) {
+    std::vector<bool> kept(modes + 1);
+    for (std::size_t at = 0; at <= text.size();) {
+        const std::size_t comma = std::min(text.find(',', at), text.size());
+        const std::string word = text.substr(at, comma - at);
+        at = comma + 1;
+        int mode = static_cast<int>(modes) + 1;
+        if (word != "residue") {
+            mode = parse_list<int>("--keep", word, "the number of a mode, nor residue")[0];
+            if (mode < 1 || mode > static_cast<int>(modes))
+                throw UsageError(
+                    fmt::format("--keep: there is no mode {}: there are 1 to {}, and residue", word, modes));
+        }
+        kept[static_cast<std::size_t>(mode - 1)] = true;
+    }
+    return kept;
 }
 
 }  // namespace
@@ -85,10 +118,11 @@ const char* name_of(Stepper stepper) {
 }
 
 void SigmaFlag::add(CLI::App& app, const EdgeScale& fallback) {
-    app.add_option("--sigma", text,
-                   fmt::format("Gradient above which an edge is kept: local, local:R (from the variance within R "
-                               "voxels), global, inf (no edges), or a number in the map's units a voxel [{}]",
-                               fallback.text()));
+    app.add_option(
+        "--sigma", text,
+        fmt::format("Gradient above which an edge is kept: local, local:R (from the variance within R "
+                    "voxels), global, inf (no edges), or a number in the map's units a voxel [{}]",
+                    fallback.text()));
 }
 
 void SigmaFlag::finish(EdgeScale& sigma) const {
@@ -110,11 +144,13 @@ std::vector<CLI::Option*> DiffusionFlags::add(CLI::App& app) {
     const auto add = [&](CLI::Option* flag) { flags.push_back(flag); };
     add(app.add_option("--order", orders,
                        "Order q of the diffusion, 0 to 15; several (0,1) are added up" + fallback(q)));
-    add(app.add_option("--diffusivity", diffusivities,
-                       "Diffusivity in voxels^(2q+2) a unit of time; one, or one for each order" + fallback(d)));
+    add(app.add_option(
+        "--diffusivity", diffusivities,
+        "Diffusivity in voxels^(2q+2) a unit of time; one, or one for each order" + fallback(d)));
     sigma.add(app, options.sigma);
     add(app.get_option("--sigma"));
-    add(app.add_option("--time", time, "How long to diffuse: a number, or auto: as long as the noise takes [auto]"));
+    add(app.add_option("--time", time,
+                       "How long to diffuse: a number, or auto: as long as the noise takes [auto]"));
     add(app.add_option("--steps", options.steps, "Number of steps, instead of --time"));
     add(app.add_option("--dt", options.dt, "Step in time; at most the bound for stability [0.9 of it]"));
     add_stepper(app, options.stepper);
@@ -184,64 +220,36 @@ void TransformFlags::add(CLI::App& app) {
     add_stepper(app, options.stepper);
     app.add_option("--keep", keep,
                    "Write one file: the sum of these modes, such as 1,3 or 2,residue [all, one file each]");
-    app.add_option("--band-pass", band_pass,
-                   "Write one file: what lies between the low-passes of two times, LOW:HIGH, both of the first "
-                   "of --orders");
+    app.add_option(
+        "--band-pass", band_pass,
+        "Write one file: what lies between the low-passes of two times, LOW:HIGH, both of the first "
+        "of --orders");
 }
 
 void TransformFlags::finish() {
-    std::vector<int> q;
+    std::vector<int> q{options.passes[0].order};
     std::vector<double> t;
-    for (const TransformOptions::Pass& pass : options.passes) {
-        q.push_back(pass.order);
-        t.push_back(pass.time);
-    }
-    const bool given = !orders.empty() || !times.empty();
+    for (const TransformOptions::Pass& pass : options.passes) t.push_back(pass.time);
     if (!orders.empty()) q = parse_integers("--orders", orders);
     if (!times.empty()) t = parse_numbers("--times", times);
     if (!band_pass.empty()) {
-        if (!times.empty() || !keep.empty())
-            throw UsageError("--band-pass takes the place of --times and of --keep");
-        const std::size_t colon = band_pass.find(':');
-        const char* what = "LOW:HIGH, two times with 0 <= LOW < HIGH";
-        if (colon == std::string::npos) throw UsageError(fmt::format("--band-pass: '{}' is not {}", band_pass, what));
-        const double low = parse_number("--band-pass", band_pass.substr(0, colon), what),
-                     high = parse_number("--band-pass", band_pass.substr(colon + 1), what);
-        if (!(low >= 0 && low < high))
-            throw UsageError(fmt::format("--band-pass: '{}' is not {}", band_pass, what));
-        set_passes({q[0], q[0]}, {low, high - low}, options);  // times of passes behind each other add up
+        if (!times.empty() || !keep.empty() || q.size() > 1)
+            throw UsageError("--band-pass takes the place of --times and --keep, and one of --orders");
+        options.passes = parse_band(band_pass, q[0]);
         kept = {false, true, false};
-    } else if (given) {
-        if (times.empty()) t.resize(std::max<std::size_t>(1, std::min(t.size(), q.size())));
-        if (q.size() > 1 || !orders.empty()) {
-            q = spread("--orders", q.size() > 1 && orders.empty() ? std::vector<int>{q[0]} : q, "--times", t.size());
-        }
-        set_passes(q, t, options);
+    } else if (!orders.empty() || !times.empty()) {
+        options.passes = make_passes(q, t);
     }
-    if (!keep.empty()) {
-        kept.assign(options.passes.size() + 1, false);
-        std::size_t at = 0;
-        while (at <= keep.size()) {
-            const std::size_t comma = std::min(keep.find(',', at), keep.size());
-            const std::string word = keep.substr(at, comma - at);
-            const int mode = word == "residue" ? static_cast<int>(kept.size())
-                                               : parse_list<int>("--keep", word, "a mode's number, nor residue")[0];
-            if (mode < 1 || mode > static_cast<int>(kept.size()) ||
-                (mode == static_cast<int>(kept.size()) && word != "residue"))
-                throw UsageError(fmt::format("--keep: there is no mode {}: they are 1 to {}, and residue", word,
-                                             options.passes.size()));
-            kept[static_cast<std::size_t>(mode - 1)] = true;
-            at = comma + 1;
-        }
-    }
+    if (!keep.empty()) kept = parse_kept(keep, options.passes.size());
     sigma.finish(options.sigma);
     check_usage(options);
 }
 
 void FlowFlags::add(CLI::App& app) {
-    app.add_option("--surface", surface_kind,
-                   "Move a surface instead of a density: mean-curvature (smooths, shrinks), surface-diffusion "
-                   "(keeps the volume) or willmore (keeps spheres)")
+    app.add_option(
+           "--surface", surface_kind,
+           "Move a surface instead of a density: mean-curvature (smooths, shrinks), surface-diffusion "
+           "(keeps the volume) or willmore (keeps spheres)")
         ->check(CLI::IsMember({"mean-curvature", "surface-diffusion", "willmore"}));
     app.add_option("--time", time,
                    fmt::format("How long: voxels^(2q+2) of a density [{}]; of a surface voxels^2 under mean "
@@ -259,17 +267,18 @@ void FlowFlags::add(CLI::App& app) {
         app.add_option("--density-scale", density.scale,
                        "Density, in the map's units, that counts as one voxel of height")
             ->capture_default_str()};
-    of_surface_ = {app.add_option("--half-width", surface.half_width,
-                                  "Half the width of the band about a surface, in voxels [what the flow needs]")};
+    of_surface_ = {
+        app.add_option("--half-width", surface.half_width,
+                       "Half the width of the band about a surface, in voxels [what the flow needs]")};
 }
 
 void FlowFlags::finish() {
     const bool moves_surface = !surface_kind.empty();
     for (const CLI::Option* flag : moves_surface ? of_density_ : of_surface_)
         if (flag->count() > 0)
-            throw UsageError(fmt::format("{} is for the flow of a {}", flag->get_name(),
-                                         moves_surface ? "density: it goes without --surface"
-                                                       : "surface: it goes with --surface"));
+            throw UsageError(fmt::format(
+                "{} is for the flow of a {}", flag->get_name(),
+                moves_surface ? "density: it goes without --surface" : "surface: it goes with --surface"));
     if (moves_surface) {
         surface.flow = surface_flows.at(surface_kind);
         if (time) surface.time = *time;

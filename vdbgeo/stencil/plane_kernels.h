@@ -53,8 +53,20 @@ struct Kernels {
     /// out = Σ_a weight_a Σ max(0, d_i + d_n)(w_n − w_i), added to what is there or not.
     void (*flux)(const PlaneRange&, const Planes& w, const Planes& d, const float weight[3], bool add, float* out);
     void (*step)(const PlaneRange&, const StepPlane&);
-    /// Diffusivity of Eqs 3, 4 from |∇u|² and the window's variance; see diffusivity.cpp.
-    void (*edge_stopping)(std::size_t n, const float* gradient2, const float* variance, float d0, float* out);
+    /// Central differences times scale[a] in the rows of a plane, a missing neighbour having the voxel's own
+    /// value; 0 in voxels that are not active. g: the components, or null; square: the sum of their squares.
+    void (*gradient)(const PlaneRange&, const Planes& u, const Planes& active, const float scale[3],
+                     float* const g[3], float* square);
+    /// out[i] = Σ_{|k| ≤ r} in[i+k], or of its square, for i in [0, n); n is a multiple of `lanes`.
+    void (*window_sum)(std::size_t n, int r, const float* in, bool squared, double* out);
+    /// out[i] = Σ_k in[k][i] for k in [0, count).
+    void (*sum_rows)(std::size_t n, int count, const double* const* in, double* out);
+    /// variance = max(floor, factor (square/count − Σ_c (sums_c/count)²)), of `components` sums.
+    void (*variance)(std::size_t n, const double* count, const double* square, const double* const* sums,
+                     int components, float factor, float floor, float* variance);
+    /// out = d0 exp(−gradient2 / (2 variance)) where active, `inactive` elsewhere.
+    void (*edge_stopping)(std::size_t n, const float* gradient2, const float* variance, const float* active,
+                          float d0, float* out);
 };
 
 /// The kernel sets this CPU can run, the plainest first. All give the same bits: sums have one order, and

@@ -116,9 +116,96 @@ inline float exponential(float x) {
     return p * scale.value;
 }
 
-void edge_stopping(std::size_t n, const float* __restrict gradient2, const float* __restrict variance, float d0,
-                   float* __restrict out) {
-    for (std::size_t i = 0; i < n; ++i) out[i] = d0 * exponential(gradient2[i] * -0.5f / variance[i]);
+void edge_stopping(std::size_t n, const float* __restrict gradient2, const float* __restrict variance,
+                   const float* __restrict active, float d0, float* __restrict out) {
+    for (std::size_t i = 0; i < n; ++i) {
+        const float d = d0 * exponential(gradient2[i] * -0.5f / variance[i]);
+        out[i] = active[i] > 0.0f ? d : inactive;
+    }
+}
+
+/// (u_after − u_before)/2, with v in the place of what is not active.
+inline float central(float v, float before, float has_before, float after, float has_after) {
+    return (has_after > 0.0f ? after - v : 0.0f) + (has_before > 0.0f ? v - before : 0.0f);
+}
+
+void gradient(const PlaneRange& range, const Planes& u, const Planes& active, const float scale[3],
+              float* const g[3], float* square) {
+    const float sx = 0.5f * scale[0], sy = 0.5f * scale[1], sz = 0.5f * scale[2];
+    const std::ptrdiff_t stride = range.stride;
+    const float *const c = u.here, *const m = active.here, *const cb = u.before, *const ca = u.after,
+                       *const mb = active.before, *const ma = active.after;
+    float *const gx = g ? g[0] : nullptr, *const gy = g ? g[1] : nullptr, *const gz = g ? g[2] : nullptr;
+    VDBGEO_FOR_ROWS(range, y, z0, z1) {
+        const std::ptrdiff_t o = y * stride;
+        const auto components = [=](std::ptrdiff_t i, float& x, float& yy, float& zz) {
+            const float v = c[i], on = m[i] > 0.0f ? 1.0f : 0.0f;
+            x = on * sx * central(v, cb[i], mb[i], ca[i], ma[i]);
+            yy = on * sy * central(v, c[i - stride], m[i - stride], c[i + stride], m[i + stride]);
+            zz = on * sz * central(v, c[i - 1], m[i - 1], c[i + 1], m[i + 1]);
+        };
+        if (g) {
+            VDBGEO_FOR_LANES(z, z0, z1) {
+                float x, yy, zz;
+                components(o + z, x, yy, zz);
+                gx[o + z] = x;
+                gy[o + z] = yy;
+                gz[o + z] = zz;
+                square[o + z] = (x * x + yy * yy) + zz * zz;
+            }
+        } else {
+            VDBGEO_FOR_LANES(z, z0, z1) {
+                float x, yy, zz;
+                components(o + z, x, yy, zz);
+                square[o + z] = (x * x + yy * yy) + zz * zz;
+            }
+        }
+    }
+}
+
+template <bool squared>
+void window_sum_of(std::size_t n, int r, const float* __restrict in, double* __restrict out) {
+    for (std::size_t block = 0; block < n; block += lanes) {
+        double sum[lanes] = {};
+        for (int k = -r; k <= r; ++k) {
+            const float* const from = in + static_cast<std::ptrdiff_t>(block) + k;
+            for (int i = 0; i < lanes; ++i) {
+                const double v = from[i];
+                sum[i] += squared ? v * v : v;
+            }
+        }
+        for (int i = 0; i < lanes; ++i) out[block + static_cast<std::size_t>(i)] = sum[i];
+    }
+}
+
+void window_sum(std::size_t n, int r, const float* in, bool squared, double* out) {
+    if (squared)
+        window_sum_of<true>(n, r, in, out);
+    else
+        window_sum_of<false>(n, r, in, out);
+}
+
+void sum_rows(std::size_t n, int count, const double* const* in, double* __restrict out) {
+    for (std::size_t block = 0; block < n; block += lanes) {
+        double sum[lanes] = {};
+        for (int k = 0; k < count; ++k)
+            for (int i = 0; i < lanes; ++i) sum[i] += in[k][block + static_cast<std::size_t>(i)];
+        for (int i = 0; i < lanes; ++i) out[block + static_cast<std::size_t>(i)] = sum[i];
+    }
+}
+
+void variance(std::size_t n, const double* __restrict count, const double* __restrict square,
+              const double* const* sums, int components, float factor, float floor, float* __restrict result) {
+    const double *const s0 = sums[0], *const s1 = components > 1 ? sums[1] : nullptr,
+                        *const s2 = components > 2 ? sums[2] : nullptr;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double one = 1.0 / (count[i] > 0.5 ? count[i] : 1.0);
+        double means = s0[i] * s0[i];
+        if (s1) means += s1[i] * s1[i];
+        if (s2) means += s2[i] * s2[i];
+        const float v = factor * static_cast<float>((square[i] - means * one) * one);
+        result[i] = v > floor ? v : floor;
+    }
 }
 
 }  // namespace
@@ -126,6 +213,7 @@ void edge_stopping(std::size_t n, const float* __restrict gradient2, const float
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, edge_stopping};
+const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, gradient,
+                                window_sum, sum_rows, variance, edge_stopping};
 
 }  // namespace vdbgeo::stencil

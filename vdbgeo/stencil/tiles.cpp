@@ -16,7 +16,7 @@ struct Shape {
     explicit Shape(int h)
         : halo(h), planes(BlockLayout::size_x + 2 * h), rows(TileGather::rows_of(h)),
           stride(TileGather::stride_of(h)), lead(TileGather::lead_of(h)), plane(rows * stride),
-          guard(plane + stride + 2 * lanes) {}
+          guard(2 * lanes) {}
     int halo, planes, rows;
     std::ptrdiff_t stride, lead, plane, guard;
     std::size_t bricks() const {
@@ -45,6 +45,7 @@ struct Arrays {
         for (std::size_t i = 0; i < f.out.size(); ++i) tile.out.push_back(take());
         spans.resize(static_cast<std::size_t>(s.planes * s.rows));
         tile.halo = s.halo;
+        tile.lead = static_cast<int>(s.lead);
         tile.stride_x = s.plane;
         tile.stride_y = s.stride;
         tile.rows = s.rows;
@@ -56,6 +57,7 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
               const std::function<void(Tile&)>& body, Arrays& a) {
     TileGather gather(layout, {cell, cell + 1}, s.halo);
     Tile& t = a.tile;
+    t.cell = static_cast<std::size_t>(cell);
     t.origin = gather.origin();
     const std::ptrdiff_t corner = s.halo * s.stride + s.lead;
     for (int x = -s.halo; x < BlockLayout::size_x + s.halo; ++x) {

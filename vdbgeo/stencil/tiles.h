@@ -15,8 +15,10 @@ namespace vdbgeo::stencil {
 /// at(x, y, z) of each array; rows along z, `stride_y` floats apart, planes `stride_x` apart, one array behind
 /// the other. Arrays have a guard of zeros before and behind.
 struct Tile {
+    std::size_t cell;               ///< its number in the layout
     openvdb::Coord origin;          ///< index of the cell's first voxel
     int halo;
+    int lead;                       ///< rows begin in memory, on a cache line, at z = −lead ≤ −halo
     std::ptrdiff_t stride_x, stride_y;
     std::vector<float*> in;         ///< the gathered fields; 0 in voxels that are not active
     float* active;                  ///< 1 in active voxels, 0 in the others

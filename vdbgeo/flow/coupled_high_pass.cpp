@@ -1,0 +1,47 @@
+#include "vdbgeo/flow/coupled_high_pass.h"
+
+#include <cmath>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/diffusion_solver.h"
+
+namespace vdbgeo {
+namespace {
+
+void require(bool holds, const char* message) {
+    if (!holds) throw InvalidInput(message);
+}
+
+}  // namespace
+
+void HighPassOptions::check() const {
+    require(order >= 0 && order <= 15, "the order is 0 to 15");
+    require(std::isfinite(slow) && slow >= 0, "the slow diffusivity is a number, 0 or more");
+    require(std::isfinite(fast) && fast >= slow, "the fast diffusivity is at least the slow one");
+    require(std::isfinite(coupling_u) && coupling_u >= 0 && std::isfinite(coupling_v) && coupling_v >= 0,
+            "couplings are numbers, 0 or more");
+    require(sigma.radius >= 1 && sigma.radius <= 8, "the radius of a local sigma is 1 to 8");
+    require(std::isfinite(time) && time >= 0, "the time is a number, 0 or more");
+    require(!dt || (std::isfinite(*dt) && *dt > 0), "dt is a number above 0");
+    require(cycle >= 1 && cycle <= 200, "a cycle has 1 to 200 steps");
+}
+
+HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options,
+                                       const Progress& progress) {
+    options.check();
+    HyperdiffusionReport report;
+    if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
+    if (grid.activeVoxelCount() == 0) return report;
+    DiffusionSolver solver(grid,
+                           {{{{options.order, options.slow}}, options.coupling_u},
+                            {{{options.order, options.fast}}, options.coupling_v}},
+                           options.sigma);
+    const double step = checked_step(options.dt, solver.bound());
+    solver.run(options.stepper, cycles_for_time(options.stepper, options.time, step, options.cycle, 1), report,
+               progress);
+    solver.describe(report);
+    solver.store(grid);
+    return report;
+}
+
+}  // namespace vdbgeo

@@ -1,0 +1,233 @@
+#include "vdbgeo/flow/diffusion_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/diffusivity.h"
+
+namespace vdbgeo {
+namespace {
+
+using stencil::BlockField;
+using stencil::BlockLayout;
+
+constexpr double drift_limit = 1e-3;  // of the range of X: rounding stays orders of magnitude below it
+
+}  // namespace
+
+double fsi_relaxation(int k) { return (4.0 * k + 2) / (2.0 * k + 3); }
+
+double cycle_time(Stepper stepper, int n, double tau) {
+    return stepper == Stepper::fsi ? tau * n * (n + 1) / 3 : tau * n;
+}
+
+CycleRun cycles_for_time(Stepper stepper, double time, double largest, int longest, int least_cycles) {
+    constexpr double whole = 1 - 1e-12;  // a time of just so many steps takes no further one
+    CycleRun r;
+    if (time <= 0) return r;
+    if (stepper != Stepper::fsi) longest = 1;
+    const double most = std::ceil(time / cycle_time(stepper, longest, largest) * whole);
+    if (most > 1e9) throw InvalidInput(fmt::format("time {:g} takes {:.3g} cycles of steps of {:g}", time, most, largest));
+    r.cycles = std::max(stepper == Stepper::fsi ? least_cycles : 1, static_cast<int>(most));
+    const double share = time / r.cycles;
+    r.n = 1;
+    while (r.n < longest && cycle_time(stepper, r.n, largest) < share * whole) ++r.n;
+    r.tau = share / cycle_time(stepper, r.n, 1);
+    return r;
+}
+
+double checked_step(const std::optional<double>& dt, double bound) {
+    constexpr double safety = 0.9;
+    if (dt && *dt > bound)
+        throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, bound));
+    return dt.value_or(safety * bound);
+}
+
+DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma)
+    : grid_(grid), layout_(grid.tree()), fields_(std::move(fields)), sigma_(sigma),
+      weights_(axis_weights(grid.transform())) {
+    for (Field& f : fields_) {
+        f.terms.erase(std::remove_if(f.terms.begin(), f.terms.end(),
+                                     [](const DiffusionTerm& t) { return t.diffusivity == 0; }),
+                      f.terms.end());
+        if (f.terms.empty()) f.terms = {{0, 0.0}};  // a field that only follows its target
+        std::sort(f.terms.begin(), f.terms.end(),
+                  [](const DiffusionTerm& a, const DiffusionTerm& b) { return a.order < b.order; });
+        State s{stencil::ShiftedField(layout_), stencil::ShiftedField(layout_), {}};
+        if (!constant_coefficients())
+            for (const DiffusionTerm& t : f.terms)
+                s.diffusivities.push_back(t.diffusivity > 0 ? BlockField(layout_.brick_count()) : BlockField());
+        states_.push_back(std::move(s));
+    }
+    stencil::load(layout_, grid.tree(), 0, states_[0].now.now());
+    const stencil::FieldSummary given = summarize(layout_, states_[0].now.now());
+    if (given.non_finite)
+        throw InvalidInput(fmt::format("{} of {} values are NaN or infinite; --threshold or --mask leaves them out",
+                                       given.non_finite, given.count + given.non_finite));
+    range_ = static_cast<double>(given.max) - given.min;
+    offset_ = static_cast<float>(given.mean());
+    for (State& s : states_) stencil::load(layout_, grid.tree(), offset_, s.now.now());
+    if (fields_.size() == 1 && fields_[0].coupling > 0) {
+        input_ = BlockField(layout_.brick_count());
+        stencil::load(layout_, grid.tree(), offset_, input_.brick(0));
+    }
+    summary_.assign(fields_.size(), summarize(layout_, states_[0].now.now()));
+    mean_before_ = mean();
+}
+
+double DiffusionSolver::bound() const {
+    const double lambda = 4 * weights_.sum();
+    double largest = 0, coupling = 0;
+    for (const Field& f : fields_) {
+        double rate = 0;
+        for (const DiffusionTerm& t : f.terms) rate += t.diffusivity * std::pow(lambda, t.order + 1);
+        largest = std::max(largest, rate);
+        coupling += f.coupling;
+    }
+    return largest + coupling > 0 ? 2 / (largest + coupling) : std::numeric_limits<double>::infinity();
+}
+
+void DiffusionSolver::freeze(std::size_t field) {
+    State& s = states_[field];
+    const float* u = s.now.now();
+    for (std::size_t i = 0; i < s.diffusivities.size(); ++i) {
+        const DiffusionTerm& term = fields_[field].terms[i];
+        if (s.diffusivities[i].empty()) continue;
+        stencil::Diffusivity d;
+        d.factor = term.diffusivity;
+        d.of_gradient = term.order > 0;
+        d.scale = sigma_.factor * sigma_.factor;
+        d.floor = std::max(std::pow(1e-6 * range_, 2), 1e-37);
+        d.radius = sigma_.kind == EdgeScale::Kind::local ? sigma_.radius : 0;
+        if (sigma_.kind == EdgeScale::Kind::value) d.sigma_squared = sigma_.value * sigma_.value;
+        if (sigma_.kind == EdgeScale::Kind::global)
+            d.sigma_squared = d.scale * (d.of_gradient ? gradient_variance(layout_, u, weights_)
+                                                       : summary_[field].variance());
+        diffusivity(layout_, u, weights_, d, s.diffusivities[i].brick(0));
+    }
+}
+
+stencil::SweepPlan DiffusionSolver::plan() {
+    stencil::SweepPlan p;
+    p.weights = weights_;
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+        stencil::SweepField f;
+        f.state = &states_[i].now;
+        f.before = &states_[i].before;
+        f.coupling = fields_[i].coupling;
+        if (!input_.empty()) f.target = input_.brick(0);
+        for (std::size_t t = 0; t < fields_[i].terms.size(); ++t) {
+            const DiffusionTerm& term = fields_[i].terms[t];
+            const bool variable = t < states_[i].diffusivities.size() && !states_[i].diffusivities[t].empty();
+            f.terms.push_back({term.order, variable ? states_[i].diffusivities[t].brick(0) : nullptr,
+                               variable ? 1.0 : term.diffusivity});
+        }
+        p.fields.push_back(std::move(f));
+    }
+    return p;
+}
+
+void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& progress) {
+    if (!constant_coefficients())
+        for (std::size_t i = 0; i < fields_.size(); ++i) freeze(i);
+    int top = 0;
+    for (const Field& f : fields_) top = std::max(top, f.terms.back().order);
+    const int most = stencil::steps_per_sweep(top), sweeps = (n + most - 1) / most;
+    for (int s = 0, k = 0; s < sweeps; ++s) {
+        stencil::SweepPlan p = plan();
+        const int end = static_cast<int>(static_cast<std::int64_t>(n) * (s + 1) / sweeps);
+        for (; k < end; ++k) p.steps.push_back({stepper == Stepper::fsi ? fsi_relaxation(k) : 1.0, tau});
+        p.begins = s == 0 || stepper != Stepper::fsi;
+        p.ends = s + 1 == sweeps || stepper != Stepper::fsi;
+        sweep(layout_, p, progress.part(double(s) / sweeps, double(s + 1) / sweeps));
+    }
+    check();
+}
+
+void DiffusionSolver::run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report,
+                          const Progress& progress) {
+    // With constant coefficients Euler's steps need no cycles: many go into one pass.
+    const int most = stepper == Stepper::euler && constant_coefficients() ? 64 : 1;
+    for (int done = 0; done < cycles.cycles;) {
+        const int together = std::min(most, cycles.cycles - done);
+        cycle(stepper, cycles.n * together, cycles.tau,
+              progress.part(double(done) / cycles.cycles, double(done + together) / cycles.cycles));
+        done += together;
+    }
+    report.steps += cycles.cycles * cycles.n;
+    report.cycles += cycles.cycles;
+    report.time += cycles.cycles * cycle_time(stepper, cycles.n, cycles.tau);
+    report.dt = cycles.tau;
+}
+
+void DiffusionSolver::describe(HyperdiffusionReport& report) const {
+    report.active_voxels = active_voxels();
+    report.mean_before = mean_before_;
+    report.mean_after = mean();
+    report.state_bytes = state_bytes();
+    report.removed = removed();
+}
+
+void DiffusionSolver::check() {
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+        summary_[i] = summarize(layout_, states_[i].now.now());
+        if (summary_[i].non_finite)
+            throw NumericalError("the values diverged: a smaller --dt or --diffusivity is needed");
+    }
+    // Coupled fields exchange what they hold; the mean of each is not kept then.
+    if (fields_.size() == 1 && std::abs(mean() - mean_before_) > drift_limit * std::max(range_, 1e-300))
+        throw NumericalError(fmt::format("the mean drifted from {:.7g} to {:.7g}", mean_before_, mean()));
+}
+
+double DiffusionSolver::removed() const {
+    const std::size_t n = layout_.brick_count();
+    const float* now = states_[0].now.now();
+    const double sum = fixed_order_reduce(
+        n, 64, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+            openvdb::FloatGrid::ConstAccessor at = grid_.getConstAccessor();
+            double part = 0;
+            for (std::size_t b = begin; b < end; ++b) {
+                const float* x = at.probeConstLeaf(layout_.origin(b))->buffer().data();
+                const float* u = now + b * BlockField::brick_size;
+                for (std::size_t w = 0; w < 8; ++w)
+                    for (std::uint64_t word = layout_.mask(b)[w]; word; word &= word - 1) {
+                        const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
+                        const double d = static_cast<double>(x[i] - offset_) - u[i];
+                        part += d * d;
+                    }
+            }
+            return part;
+        },
+        [](double& total, double part) { total += part; });
+    return std::sqrt(sum / std::max(1.0, static_cast<double>(layout_.active_count())));
+}
+
+void DiffusionSolver::store(openvdb::FloatGrid& grid) const {
+    if (fields_.size() == 1) {
+        stencil::store(layout_, states_[0].now.now(), offset_, grid.tree());
+        return;
+    }
+    BlockField difference(layout_.brick_count());
+    const float *u = states_[0].now.now(), *v = states_[1].now.now();
+    parallel_blocks(layout_.brick_count() * BlockField::brick_size, 1 << 15, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) difference.brick(0)[i] = u[i] - v[i];
+    });
+    stencil::store(layout_, difference.brick(0), 0, grid.tree());
+}
+
+std::size_t DiffusionSolver::state_bytes() const {
+    std::size_t bytes = layout_.memory() + (input_.empty() ? 0 : input_.memory());
+    for (const State& s : states_) {
+        bytes += s.now.memory() + s.before.memory();
+        for (const BlockField& d : s.diffusivities) bytes += d.empty() ? 0 : d.memory();
+    }
+    return bytes;
+}
+
+}  // namespace vdbgeo

@@ -1,0 +1,83 @@
+// What hyperdiffusion, the coupled high-pass and the PDE transform share: fields on bricks that are stepped in
+// cycles of frozen coefficients.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "vdbgeo/flow/hyperdiffusion.h"
+#include "vdbgeo/stencil/diffusion_sweep.h"
+
+namespace vdbgeo {
+
+/// Cycles of n steps of τ each.
+struct CycleRun {
+    int cycles = 0, n = 0;
+    double tau = 0;
+};
+
+/// Relaxation factors α_k = (4k+2)/(2k+3) of a cycle.
+double fsi_relaxation(int k);
+/// Time that a cycle of n steps of τ advances: τ n (n+1)/3 with FSI, n τ else.
+double cycle_time(Stepper stepper, int n, double tau);
+/// The cycles that take a time with steps of at most `largest`: as few as the longest cycle allows, each as
+/// short as that leaves it. Steppers other than FSI have cycles of one step.
+CycleRun cycles_for_time(Stepper stepper, double time, double largest, int longest, int least_cycles);
+/// Throws InvalidInput where dt is above the bound; the step to use: dt, or 0.9 of the bound.
+double checked_step(const std::optional<double>& dt, double bound);
+
+/// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with two,
+/// each is drawn to the other.
+class DiffusionSolver {
+ public:
+    struct Field {
+        std::vector<DiffusionTerm> terms;
+        double coupling = 0;  ///< β
+    };
+    /// Takes X from the grid, which has leaves only (voxelized). The grid is read now and by `removed`, and has
+    /// to live as long. InvalidInput for values that are not finite.
+    DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma);
+
+    /// Explicit steps are stable up to this.
+    double bound() const;
+    /// Evaluates the coefficients and takes n steps: FSI's, or n times α = 1. Checks that the values are finite
+    /// and that their mean stays where it was; NumericalError.
+    void cycle(Stepper stepper, int n, double tau, const Progress& progress = {});
+    /// Takes the cycles and adds them to the report's steps, time, cycles; its dt becomes τ.
+    void run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report, const Progress& progress = {});
+    /// Voxels, means, what was removed, memory.
+    void describe(HyperdiffusionReport& report) const;
+
+    std::uint64_t active_voxels() const { return layout_.active_count(); }
+    double mean_before() const { return mean_before_; }
+    double mean(std::size_t field = 0) const { return summary_[field].mean() + offset_; }
+    bool constant_coefficients() const { return sigma_.kind == EdgeScale::Kind::infinite; }
+    /// Root mean square of X − u over the active voxels, of the first field.
+    double removed() const;
+    /// Writes the first field into the grid's active voxels; with two fields their difference.
+    void store(openvdb::FloatGrid& grid) const;
+    /// Memory of fields and tables.
+    std::size_t state_bytes() const;
+
+ private:
+    struct State {
+        stencil::ShiftedField now, before;
+        std::vector<stencil::BlockField> diffusivities;  // by term; empty with constant coefficients
+    };
+    void freeze(std::size_t field);
+    stencil::SweepPlan plan();
+    void check();
+
+    const openvdb::FloatGrid& grid_;
+    stencil::BlockLayout layout_;
+    std::vector<Field> fields_;
+    std::vector<State> states_;
+    stencil::BlockField input_;  // X, where it is a target
+    std::vector<stencil::FieldSummary> summary_;
+    EdgeScale sigma_;
+    Vec3d weights_;
+    float offset_ = 0;  // taken off X, so that rounding errors go with the spread of the values, not their size
+    double mean_before_ = 0, range_ = 0;
+};
+
+}  // namespace vdbgeo

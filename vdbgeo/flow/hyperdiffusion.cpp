@@ -1,0 +1,124 @@
+#include "vdbgeo/flow/hyperdiffusion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/diffusion_solver.h"
+#include "vdbgeo/flow/noise.h"
+#include "vdbgeo/volume/density_map.h"
+
+namespace vdbgeo {
+namespace {
+
+void require(bool holds, const std::string& message) {
+    if (!holds) throw InvalidInput(message);
+}
+
+/// What the options ask for, given the largest step.
+std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
+    if (!o.steps) return {cycles_for_time(o.stepper, *o.time, largest, o.cycle, o.min_cycles)};
+    if (o.stepper != Stepper::fsi) return {{*o.steps, 1, largest}};
+    std::vector<CycleRun> plan;
+    const int cycles = std::max(o.min_cycles, (*o.steps + o.cycle - 1) / o.cycle);
+    for (int c = 0, done = 0; c < cycles; ++c) {
+        const int end = static_cast<int>(static_cast<std::int64_t>(*o.steps) * (c + 1) / cycles);
+        if (end > done) plan.push_back({1, end - done, largest});
+        done = end;
+    }
+    return plan;
+}
+
+}  // namespace
+
+EdgeScale EdgeScale::parse(const std::string& text) {
+    EdgeScale s;
+    if (text == "global") {
+        s.kind = Kind::global;
+    } else if (text == "inf") {
+        s.kind = Kind::infinite;
+    } else if (text.rfind("local", 0) == 0) {
+        char* end = nullptr;
+        if (text.size() > 5) {
+            s.radius = text[5] == ':' ? static_cast<int>(std::strtol(text.c_str() + 6, &end, 10)) : 0;
+            if (!end || end == text.c_str() + 6 || *end || s.radius < 1 || s.radius > 8) s.radius = 0;
+        }
+        require(s.radius > 0, text + ": the radius of a local sigma is a whole number from 1 to 8 (local:2)");
+    } else {
+        char* end = nullptr;
+        s.kind = Kind::value;
+        s.value = std::strtod(text.c_str(), &end);
+        require(end != text.c_str() && !*end && std::isfinite(s.value) && s.value > 0,
+                text + ": sigma is local, local:R, global, inf or a number above 0");
+    }
+    return s;
+}
+
+std::string EdgeScale::text() const {
+    const std::string times = factor == 1 ? "" : fmt::format(" x {:g}", factor);
+    switch (kind) {
+        case Kind::local: return fmt::format("local:{}", radius) + times;
+        case Kind::global: return "global" + times;
+        case Kind::infinite: return "inf";
+        default: return fmt::format("{:g}", value);
+    }
+}
+
+void HyperdiffusionOptions::check() const {
+    require(!terms.empty(), "at least one order is needed");
+    std::set<int> orders;
+    for (const DiffusionTerm& t : terms) {
+        require(t.order >= 0 && t.order <= 15, fmt::format("order {}: 0 to 15", t.order));
+        require(orders.insert(t.order).second, fmt::format("order {} is given twice", t.order));
+        require(std::isfinite(t.diffusivity) && t.diffusivity > 0, "a diffusivity is a number above 0");
+    }
+    require(sigma.radius >= 1 && sigma.radius <= 8, "the radius of a local sigma is 1 to 8");
+    require(sigma.kind != EdgeScale::Kind::value || (std::isfinite(sigma.value) && sigma.value > 0),
+            "sigma is above 0");
+    require(std::isfinite(sigma.factor) && sigma.factor > 0, "the factor of sigma is above 0");
+    require(!time || (std::isfinite(*time) && *time >= 0), "the time is a number, 0 or more");
+    require(!steps || *steps >= 0, "the number of steps is 0 or more");
+    require(!(time && steps), "give the time or the number of steps, not both");
+    require(!dt || (std::isfinite(*dt) && *dt > 0), "dt is a number above 0");
+    require(cycle >= 1 && cycle <= 200, "a cycle has 1 to 200 steps");
+    require(min_cycles >= 1 && min_cycles <= 1000000, "the least number of cycles is 1 or more");
+    require(std::isfinite(fidelity) && fidelity >= 0, "the fidelity is a number, 0 or more");
+}
+
+double HyperdiffusionOptions::largest_rate(const Vec3d& weights) const {
+    const double lambda = 4 * weights.sum();
+    double rate = fidelity;
+    for (const DiffusionTerm& t : terms) rate += t.diffusivity * std::pow(lambda, t.order + 1);
+    return rate;
+}
+
+Vec3d axis_weights(const openvdb::math::Transform& transform) {
+    const Vec3d h = frame_of(transform).voxel_size();
+    Vec3d w;
+    // The cell of a file is rounded to single precision: what differs by less is cubic.
+    const double least = h.minCoeff();
+    for (int a = 0; a < 3; ++a) w[a] = h[a] < least * (1 + 1e-5) ? 1.0 : (least / h[a]) * (least / h[a]);
+    return w;
+}
+
+HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options,
+                                  const Progress& progress) {
+    options.check();
+    HyperdiffusionReport report;
+    if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
+    if (grid.activeVoxelCount() == 0) return report;
+    DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma);
+    const std::vector<CycleRun> plan = plan_of(options, checked_step(options.dt, solver.bound()));
+    for (std::size_t i = 0; i < plan.size(); ++i)
+        solver.run(options.stepper, plan[i], report,
+                   progress.part(double(i) / double(plan.size()), double(i + 1) / double(plan.size())));
+    solver.describe(report);
+    if (report.steps) solver.store(grid);
+    return report;
+}
+
+}  // namespace vdbgeo

@@ -34,10 +34,11 @@ struct DenoiseOptions {
 
 void DenoiseOptions::check_flags() const {
     const bool blurs = method == "gaussian" || method == "bilateral";
-    const std::vector<std::pair<const std::vector<CLI::Option*>*, bool>> groups{{&for_diffusion, diffuses()},
-                                                                                {&for_blur, blurs},
-                                                                                {&for_range, method == "bilateral"},
-                                                                                {&for_radius, method == "median"}};
+    const std::vector<std::pair<const std::vector<CLI::Option*>*, bool>> groups{
+        {&for_diffusion, diffuses()},
+        {&for_blur, blurs},
+        {&for_range, method == "bilateral"},
+        {&for_radius, method == "median"}};
     for (const auto& [flags, wanted] : groups)
         for (const CLI::Option* flag : *flags)
             if (flag->count() > 0 && !wanted)
@@ -50,7 +51,8 @@ void DenoiseOptions::finish(Session& session) {
     check_map_output(files.out, session);
     check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
-        if (!diffusion.orders.empty()) throw UsageError("--method perona-malik is --order 0: give one of them");
+        if (!diffusion.orders.empty())
+            throw UsageError("--method perona-malik is --order 0: give one of them");
         diffusion.orders = "0";
     }
     diffusion.finish();
@@ -86,10 +88,9 @@ Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progres
     j["automatic"] = r.automatic;
     j["noise"] = r.automatic ? Json(r.noise) : Json();
     j.update(report_json(r));
-    const std::string settings =
-        fmt::format("order {}, diffusivity {}, sigma {}{}", fmt::join(orders, ","), fmt::join(diffusivities, ","),
-                    options.sigma.text(),
-                    options.fidelity > 0 ? fmt::format(", fidelity {:.6g}", options.fidelity) : "");
+    const std::string settings = fmt::format(
+        "order {}, diffusivity {}, sigma {}{}", fmt::join(orders, ","), fmt::join(diffusivities, ","),
+        options.sigma.text(), options.fidelity > 0 ? fmt::format(", fidelity {:.6g}", options.fidelity) : "");
     out.lines = {fmt::format("method      {}, {}", o.method, settings)};
     if (r.automatic) out.lines.push_back(fmt::format("noise       {}", noise_text(r.noise)));
     out.lines.push_back(fmt::format("time        {} ({}){}", steps_text(r), name_of(options.stepper),
@@ -137,8 +138,9 @@ void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Sessi
     if (session.json || session.quiet) return;
     for (const std::string& line : outcome.lines) session.say(line);
     const double share = rms_before > 0 ? 100 * outcome.removed / rms_before : 0;
-    session.say(fmt::format("removed     {:.4g} (root mean square), {:.1f} % of the map's deviation of {:.4g}",
-                            outcome.removed, share, rms_before));
+    session.say(
+        fmt::format("removed     {:.4g} (root mean square), {:.1f} % of the map's deviation of {:.4g}",
+                    outcome.removed, share, rms_before));
     session.say(fmt::format("mean        {:.6g}, was {:.6g}", j["mean_after"].get<double>(),
                             j["mean_before"].get<double>()));
     session.say(fmt::format("voxels      {}", j["active_voxels"].get<std::uint64_t>()));
@@ -184,35 +186,39 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
 }  // namespace
 
 Command denoise_command() {
-    return {"denoise", "Take the noise out of a map by hyperdiffusion; or by a Gaussian, a median, a bilateral filter",
-            "  vdbgeo denoise emd_1080.map smooth.mrc --preview smooth.png\n"
-            "  vdbgeo denoise emd_1080.map smooth.vdb --order 1 --sigma local:3 --time 2\n"
-            "  vdbgeo denoise emd_1080.map median.mrc --method median --radius 1",
-            [](CLI::App& app) {
-                auto o = std::make_shared<DenoiseOptions>();
-                app.add_option("--method", o->method,
-                               "hyperdiffusion, perona-malik (its order 0), gaussian, median or bilateral")
-                    ->check(CLI::IsMember({"hyperdiffusion", "perona-malik", "gaussian", "median", "bilateral"})
-                                .description(""))
-                    ->capture_default_str();
-                o->for_diffusion = o->diffusion.add(app);
-                o->for_blur = {app.add_option("--blur", o->blur,
-                                              "Standard deviation of the gaussian and the bilateral filter in "
-                                              "voxels, to 10.5")
-                                   ->capture_default_str()};
-                o->for_range = {app.add_option("--range", o->range,
-                                               "Difference in density, in the map's units, that the bilateral "
-                                               "filter keeps [2.5 times the estimated noise]")};
-                o->for_radius = {app.add_option("--radius", o->radius, "Radius of the median's window in voxels, to 8")
-                                     ->check(CLI::Range(0, 8).description(""))
-                                     ->capture_default_str()};
-                o->files.add(app, "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
-                o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
-                return [o](Session& session) {
-                    o->finish(session);
-                    run_denoise(*o, session);
-                };
-            }};
+    return {
+        "denoise",
+        "Take the noise out of a map by hyperdiffusion; or by a Gaussian, a median, a bilateral filter",
+        "  vdbgeo denoise emd_1080.map smooth.mrc --preview smooth.png\n"
+        "  vdbgeo denoise emd_1080.map smooth.vdb --order 1 --sigma local:3 --time 2\n"
+        "  vdbgeo denoise emd_1080.map median.mrc --method median --radius 1",
+        [](CLI::App& app) {
+            auto o = std::make_shared<DenoiseOptions>();
+            app.add_option("--method", o->method,
+                           "hyperdiffusion, perona-malik (its order 0), gaussian, median or bilateral")
+                ->check(CLI::IsMember({"hyperdiffusion", "perona-malik", "gaussian", "median", "bilateral"})
+                            .description(""))
+                ->capture_default_str();
+            o->for_diffusion = o->diffusion.add(app);
+            o->for_blur = {app.add_option("--blur", o->blur,
+                                          "Standard deviation of the gaussian and the bilateral filter in "
+                                          "voxels, to 10.5")
+                               ->capture_default_str()};
+            o->for_range = {app.add_option("--range", o->range,
+                                           "Difference in density, in the map's units, that the bilateral "
+                                           "filter keeps [2.5 times the estimated noise]")};
+            o->for_radius = {
+                app.add_option("--radius", o->radius, "Radius of the median's window in voxels, to 8")
+                    ->check(CLI::Range(0, 8).description(""))
+                    ->capture_default_str()};
+            o->files.add(app,
+                         "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
+            o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
+            return [o](Session& session) {
+                o->finish(session);
+                run_denoise(*o, session);
+            };
+        }};
 }
 
 }  // namespace vdbgeo::app

@@ -31,11 +31,11 @@ void run_edges(const EdgesOptions& o, Session& session) {
     const HyperdiffusionReport r =
         naming(o.files.in, [&] { return coupled_high_pass(*in.map.grid, options, progress); });
     clear_inactive(*in.map.grid);
-    finish_map(in.map, fmt::format("edges: order {}, diffusivities {} and {}, coupling {} and {}, sigma {}, time "
-                                   "{:.9g}, {} steps, dt {:.9g}, {}",
-                                   options.order, options.slow, options.fast, options.coupling_u,
-                                   options.coupling_v, options.sigma.text(), r.time, r.steps, r.dt,
-                                   name_of(options.stepper)));
+    finish_map(in.map,
+               fmt::format("edges: order {}, diffusivities {} and {}, coupling {} and {}, sigma {}, time "
+                           "{:.9g}, {} steps, dt {:.9g}, {}",
+                           options.order, options.slow, options.fast, options.coupling_u, options.coupling_v,
+                           options.sigma.text(), r.time, r.steps, r.dt, name_of(options.stepper)));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, in);
     j.update({{"order", options.order},
@@ -71,19 +71,21 @@ void run_edges(const EdgesOptions& o, Session& session) {
 }  // namespace
 
 Command edges_command() {
-    return {"edges", "Find the edges of a map: the difference of two coupled diffusions, a fast and a slow one",
-            "  vdbgeo edges emd_1080.map edges.mrc --time 10", [](CLI::App& app) {
-                auto o = std::make_shared<EdgesOptions>();
-                o->high_pass.add(app);
-                o->files.add(app, "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
-                o->files.add_preview(app, "Picture (PNG) of sections and power spectra of the map and its edges");
-                return [o](Session& session) {
-                    o->files.finish();
-                    o->high_pass.finish();
-                    check_map_output(o->files.out, session);
-                    run_edges(*o, session);
-                };
-            }};
+    return {
+        "edges", "Find the edges of a map: the difference of two coupled diffusions, a fast and a slow one",
+        "  vdbgeo edges emd_1080.map edges.mrc --time 10", [](CLI::App& app) {
+            auto o = std::make_shared<EdgesOptions>();
+            o->high_pass.add(app);
+            o->files.add(app,
+                         "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
+            o->files.add_preview(app, "Picture (PNG) of sections and power spectra of the map and its edges");
+            return [o](Session& session) {
+                o->files.finish();
+                o->high_pass.finish();
+                check_map_output(o->files.out, session);
+                run_edges(*o, session);
+            };
+        }};
 }
 
 }  // namespace vdbgeo::app

@@ -58,9 +58,11 @@ void move_density(const FlowOptions& o, MapFile& in, Run& run, Session& session)
     const Progress progress = session.stage("flow");
     const HyperdiffusionReport r =
         naming(o.files.in, [&] { return geometric_flow(*in.map.grid, options, progress); });
-    const std::string settings = fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order,
-                                             options.fidelity, options.pressure, options.scale);
-    finish_map(in.map, fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings, r.time, r.steps));
+    const std::string settings =
+        fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order, options.fidelity,
+                    options.pressure, options.scale);
+    finish_map(in.map,
+               fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings, r.time, r.steps));
     run.result["flow"] = "density";
     run.result.update({{"order", options.order},
                        {"fidelity", options.fidelity},
@@ -101,8 +103,8 @@ void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session)
         naming(o.files.in, [&] { return level_set_flow(*map.grid, o.flow.surface, progress); });
     if (r.vanished)
         throw NumericalError(
-            fmt::format("{}: nothing is left of the surface after a time of {}; try a shorter --time", o.files.in,
-                        o.flow.surface.time));
+            fmt::format("{}: nothing is left of the surface after a time of {}; try a shorter --time",
+                        o.files.in, o.flow.surface.time));
     finish_map(map, fmt::format("flow of the surface: {}, time {:.9g}, {} steps", o.flow.surface_kind, r.time,
                                 r.steps));
     const double voxel = map.frame.voxel_volume();
@@ -117,8 +119,8 @@ void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session)
     session.say(fmt::format("flow        {} of the surface{}", o.flow.surface_kind,
                             j.contains("iso") ? fmt::format(" at {:.6g}", j["iso"].get<double>()) : ""));
     session.say(fmt::format("time        {:.4g} in {} steps, dt {:.4g}", r.time, r.steps, r.dt));
-    session.say(fmt::format("volume      {:.6g} Å³, was {:.6g} Å³", voxel * r.volume_after,
-                            voxel * r.volume_before));
+    session.say(
+        fmt::format("volume      {:.6g} Å³, was {:.6g} Å³", voxel * r.volume_after, voxel * r.volume_before));
     session.say(fmt::format("voxels      {}", r.active_voxels));
 }
 
@@ -145,9 +147,10 @@ Command flow_command() {
                 o->flow.add(app);
                 o->iso.add(app);
                 o->iso_flag = app.get_option("--iso");
-                o->files.add(app,
-                             "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe; of a "
-                             "surface, its signed distances in Å");
+                o->files.add(
+                    app,
+                    "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe; of a "
+                    "surface, its signed distances in Å");
                 o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
                 return [o](Session& session) {
                     o->files.finish();

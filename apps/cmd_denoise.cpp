@@ -149,7 +149,7 @@ void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Sessi
 void run_denoise(const DenoiseOptions& o, Session& session) {
     Json seconds;
     Clock clock;
-    const double state = o.diffuses() ? 20.2 : 8.4;  // bytes a voxel: grid and fields, or the grid twice
+    const double state = o.diffuses() ? 20.2 : 16.4;  // bytes a voxel: grid and fields
     MapFile in = read_for_filter(o.files, {"denoising", state}, session);
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();

@@ -23,7 +23,7 @@ void HighPassOptions::check() const {
     sigma.check();
     require(std::isfinite(time) && time >= 0, "the time is a number, 0 or more");
     require(!dt || (std::isfinite(*dt) && *dt > 0), "dt is a number above 0");
-    require(cycle >= 1 && cycle <= 200, "a cycle has 1 to 200 steps");
+    require(!cycle || (*cycle >= 1 && *cycle <= 300), "a cycle has 1 to 300 steps");
 }
 
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options,
@@ -36,8 +36,8 @@ HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassO
                            {{{{options.order, options.slow}}, options.coupling_u},
                             {{{options.order, options.fast}}, options.coupling_v}},
                            options.sigma);
-    const double step = checked_step(options.dt, solver.bound());
-    solver.run(options.stepper, cycles_for_time(options.stepper, options.time, step, options.cycle, 1), report,
+    const double step = solver.step(options.stepper, options.dt);
+    solver.run(options.stepper, cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}), report,
                progress);
     solver.describe(report);
     solver.store(grid);

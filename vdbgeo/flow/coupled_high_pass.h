@@ -15,7 +15,7 @@ struct HighPassOptions {
     double time = 10;            ///< ≥ 0
     std::optional<double> dt;    ///< Euler's step; at most the bound
     Stepper stepper = Stepper::fsi;
-    int cycle = 20;
+    std::optional<int> cycle;    ///< steps in a cycle of frozen coefficients, 1…300; unset: they grow
 
     void check() const;
 };

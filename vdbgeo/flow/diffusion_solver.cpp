@@ -9,34 +9,13 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/stencil/diffusivity.h"
+#include "vdbgeo/stencil/line_solve.h"
 
 namespace vdbgeo {
 namespace {
 
 using stencil::BlockField;
 using stencil::BlockLayout;
-
-/// ±1, a function of the voxel alone: two rounds of the splitmix64 finaliser, as the phantoms' noise has it.
-float random_sign(const openvdb::Coord& origin, std::uint64_t voxel) {
-    const auto mix = [](std::uint64_t x) {
-        x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-        x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-        return x ^ (x >> 31);
-    };
-    const auto at = [](int c) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c)); };
-    const std::uint64_t leaf = mix(mix(at(origin.x()) << 32 | at(origin.y())) ^ at(origin.z()));
-    return mix(leaf + 0x9e3779b97f4a7c15ULL * (voxel + 1)) >> 63 ? 1.0f : -1.0f;
-}
-
-/// The probe's value in every voxel of a layout, 0 in those that are not active.
-void fill_signs(const BlockLayout& layout, float* out) {
-    parallel_for(layout.brick_count(), 64, [&](std::size_t b) {
-        for (std::uint64_t i = 0; i < BlockField::brick_size; ++i) {
-            const bool on = layout.mask(b)[i >> 6] >> (i & 63) & 1;
-            out[b * BlockField::brick_size + i] = on ? random_sign(layout.origin(b), i) : 0.0f;
-        }
-    });
-}
 
 constexpr double drift_limit = 1e-3;  // of the range of X: rounding stays orders of magnitude below it
 
@@ -48,26 +27,48 @@ double cycle_time(Stepper stepper, int n, double tau) {
     return stepper == Stepper::fsi ? tau * n * (n + 1) / 3 : tau * n;
 }
 
-CycleRun cycles_for_time(Stepper stepper, double time, double largest, int longest, int least_cycles) {
-    constexpr double whole = 1 - 1e-12;  // a time of just so many steps takes no further one
-    CycleRun r;
-    if (time <= 0) return r;
-    if (stepper != Stepper::fsi) longest = 1;
-    const double most = std::ceil(time / cycle_time(stepper, longest, largest) * whole);
-    if (most > 1e9) throw InvalidInput(fmt::format("time {:g} takes {:.3g} cycles of steps of {:g}", time, most, largest));
-    r.cycles = std::max(stepper == Stepper::fsi ? least_cycles : 1, static_cast<int>(most));
-    const double share = time / r.cycles;
-    r.n = 1;
-    while (r.n < longest && cycle_time(stepper, r.n, largest) < share * whole) ++r.n;
+int growing_cycle(int order, int k) {
+    constexpr double smoothed = 1.73, lambda = 12, most = 300;
+    const double n = smoothed * std::pow(lambda, 0.5 * (order + 1)) * std::pow(order == 0 ? 1.25 : 2.0, k);
+    return static_cast<int>(std::min(n + 0.5, most));
+}
+
+namespace {
+
+constexpr double whole = 1 - 1e-12;  // a time of just so many steps takes no further one
+
+/// As many cycles of one length, as short as that leaves it.
+CycleRun equal_cycles(Stepper stepper, int cycles, double time, double largest) {
+    CycleRun r{cycles, 1, 0};
+    const double share = time / cycles;
+    while (cycle_time(stepper, r.n, largest) < share * whole && stepper == Stepper::fsi) ++r.n;
     r.tau = share / cycle_time(stepper, r.n, 1);
     return r;
 }
 
-double checked_step(const std::optional<double>& dt, double bound) {
-    constexpr double safety = 0.9;
-    if (dt && *dt > bound)
-        throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, bound));
-    return dt.value_or(safety * bound);
+}  // namespace
+
+std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double largest, const CycleRule& rule) {
+    if (time <= 0) return {};
+    if (stepper != Stepper::fsi || rule.longest) {
+        const int n = stepper == Stepper::fsi ? *rule.longest : 1;
+        const double cycles = std::ceil(time / cycle_time(stepper, n, largest) * whole);
+        if (cycles > 1e9)
+            throw InvalidInput(fmt::format("time {:g} takes {:.3g} cycles of steps of {:g}", time, cycles, largest));
+        const int least = stepper == Stepper::fsi ? rule.least : 1;
+        return {equal_cycles(stepper, std::max(least, static_cast<int>(cycles)), time, largest)};
+    }
+    std::vector<CycleRun> growing;
+    double all = 0;
+    while (all < time * whole || static_cast<int>(growing.size()) < rule.least) {
+        growing.push_back({1, growing_cycle(rule.order, static_cast<int>(growing.size())), 0});
+        all += cycle_time(stepper, growing.back().n, largest);
+        if (growing.size() > 1000000)
+            throw InvalidInput(fmt::format("time {:g} takes more than a million cycles of steps of {:g}", time, largest));
+    }
+    if (static_cast<int>(growing.size()) <= rule.least) return {equal_cycles(stepper, rule.least, time, largest)};
+    for (CycleRun& r : growing) r.tau = largest * (time / all);
+    return growing;
 }
 
 DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma)
@@ -114,6 +115,14 @@ double DiffusionSolver::bound() const {
     return largest + coupling > 0 ? 2 / (largest + coupling) : std::numeric_limits<double>::infinity();
 }
 
+double DiffusionSolver::step(Stepper stepper, const std::optional<double>& dt) const {
+    constexpr double safety = 0.9, longer = 20;
+    if (stepper == Stepper::adi) return dt.value_or(longer * safety * bound());
+    if (dt && *dt > bound())
+        throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, bound()));
+    return dt.value_or(safety * bound());
+}
+
 void DiffusionSolver::freeze(std::size_t field) {
     State& s = states_[field];
     const float* u = s.now.now();
@@ -137,7 +146,7 @@ void DiffusionSolver::freeze(std::size_t field) {
 stencil::SweepPlan DiffusionSolver::plan() {
     stencil::SweepPlan p;
     p.weights = weights_;
-    for (std::size_t i = 0; i < fields_.size(); ++i) {  // without the probe
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
         stencil::SweepField f;
         f.state = &states_[i].now;
         f.before = &states_[i].before;
@@ -151,18 +160,20 @@ stencil::SweepPlan DiffusionSolver::plan() {
         }
         p.fields.push_back(std::move(f));
     }
-    if (probe_) {
-        stencil::SweepField f = p.fields.front();
-        f.state = &states_.back().now;
-        f.before = &states_.back().before;
-        p.fields.push_back(std::move(f));
-    }
     return p;
 }
 
 void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& progress) {
     if (!constant_coefficients())
         for (std::size_t i = 0; i < fields_.size(); ++i) freeze(i);
+    if (stepper == Stepper::adi) {
+        for (int k = 0; k < n; ++k) {
+            implicit_step(tau);
+            progress.report(double(k + 1) / n);
+        }
+        check();
+        return;
+    }
     int top = 0;
     for (const Field& f : fields_) top = std::max(top, f.terms.back().order);
     const int most = stencil::steps_per_sweep(top), sweeps = (n + most - 1) / most;
@@ -175,6 +186,30 @@ void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& 
         sweep(layout_, p, progress.part(double(s) / sweeps, double(s + 1) / sweeps));
     }
     check();
+}
+
+/// u += Π_a (I + θ τ A_a)^{-1} τ A u, where A is the whole operator and A_a = Σ_q L_{d,a} L_a^q: first order in time
+/// for any θ. With constant coefficients (Σλ_a)^{q+1} ≤ 3^q Σ λ_a^{q+1}, so an amplitude changes by at most 3^q/θ
+/// times itself: stable for θ ≥ 3^q/2, whatever τ.
+void DiffusionSolver::implicit_step(double tau) {
+    stencil::SweepPlan p = plan();
+    p.steps = {{1.0, tau}};
+    p.ends = false;  // u_k stays, in `before`
+    sweep(layout_, p);
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+        const double theta = std::max(1.0, 0.5 * std::pow(3.0, fields_[i].terms.back().order));
+        float* next = states_[i].now.now();
+        const float* here = states_[i].before.now();
+        const std::size_t values = layout_.brick_count() * BlockField::brick_size;
+        const auto damping = static_cast<float>(1 / (1 + theta * tau * fields_[i].coupling));
+        parallel_blocks(values, 1 << 15, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) next[k] = (next[k] - here[k]) * damping;
+        });
+        solve_lines(layout_, p.fields[i].terms, weights_, theta * tau, next);
+        parallel_blocks(values, 1 << 15, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) next[k] += here[k];
+        });
+    }
 }
 
 void DiffusionSolver::run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report,
@@ -191,6 +226,17 @@ void DiffusionSolver::run(Stepper stepper, const CycleRun& cycles, Hyperdiffusio
     report.cycles += cycles.cycles;
     report.time += cycles.cycles * cycle_time(stepper, cycles.n, cycles.tau);
     report.dt = cycles.tau;
+}
+
+void DiffusionSolver::run(Stepper stepper, const std::vector<CycleRun>& cycles, HyperdiffusionReport& report,
+                          const Progress& progress) {
+    double all = 0, done = 0;
+    for (const CycleRun& r : cycles) all += double(r.cycles) * r.n;
+    for (const CycleRun& r : cycles) {
+        const double share = double(r.cycles) * r.n;
+        run(stepper, r, report, progress.part(done / all, (done + share) / all));
+        done += share;
+    }
 }
 
 void DiffusionSolver::describe(HyperdiffusionReport& report) const {
@@ -212,31 +258,9 @@ void DiffusionSolver::check() {
         throw NumericalError(fmt::format("the mean drifted from {:.7g} to {:.7g}", mean_before_, mean()));
 }
 
-void DiffusionSolver::start_probe() {
-    probe_ = true;
-    states_.push_back({stencil::ShiftedField(layout_), stencil::ShiftedField(layout_), {}});
-    // The direction in which both fields go through the slabs has to be the same.
-    if (states_.back().now.forward() != states_.front().now.forward()) states_.back().now.turn();
-    if (states_.back().before.forward() != states_.front().before.forward()) states_.back().before.turn();
-    fill_signs(layout_, states_.back().now.now());
-}
-
-double DiffusionSolver::trace() const {
-    const float* now = states_.back().now.now();
-    const double sum = fixed_order_reduce(
-        layout_.brick_count(), 64, 0.0,
-        [&](std::size_t begin, std::size_t end) {
-            double part = 0;
-            for (std::size_t b = begin; b < end; ++b)
-                for (std::size_t w = 0; w < 8; ++w)
-                    for (std::uint64_t word = layout_.mask(b)[w]; word; word &= word - 1) {
-                        const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
-                        part += random_sign(layout_.origin(b), i) * now[b * BlockField::brick_size + i];
-                    }
-            return part;
-        },
-        [](double& total, double part) { total += part; });
-    return sum / std::max(1.0, static_cast<double>(layout_.active_count()));
+void DiffusionSolver::reset() {
+    for (State& s : states_) stencil::load(layout_, grid_.tree(), offset_, s.now.now());
+    for (stencil::FieldSummary& s : summary_) s = summarize(layout_, states_[0].now.now());
 }
 
 double DiffusionSolver::removed() const {

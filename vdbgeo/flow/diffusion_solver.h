@@ -20,12 +20,18 @@ struct CycleRun {
 double fsi_relaxation(int k);
 /// Time that a cycle of n steps of τ advances: τ n (n+1)/3 with FSI, n τ else.
 double cycle_time(Stepper stepper, int n, double tau);
-/// The cycles that take a time with steps of at most `largest`: as few as the longest cycle allows, each as
-/// short as that leaves it. Steppers other than FSI have cycles of one step.
-CycleRun cycles_for_time(Stepper stepper, double time, double largest, int longest, int least_cycles);
-/// Throws InvalidInput where dt is above the bound; the step to use: dt, or 0.9 of the bound.
-double checked_step(const std::optional<double>& dt, double bound);
-
+/// How a time is divided into cycles.
+struct CycleRule {
+    int order = 0;               ///< the highest order there is
+    std::optional<int> longest;  ///< cycles of one length, of at most this many steps; unset: they grow
+    int least = 1;               ///< cycles at least
+};
+/// Steps of the k-th growing cycle. The first smooths over about two voxels, so that the noise no longer hides
+/// the edges when the coefficients are next found; then there is less and less that they have to follow: the
+/// length grows by a quarter (order 0) or doubles, up to 300 steps.
+int growing_cycle(int order, int k);
+/// The cycles that take a time with FSI, with steps of at most `largest`; for other steppers cycles of one step.
+std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double largest, const CycleRule& rule);
 /// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with two,
 /// each is drawn to the other.
 class DiffusionSolver {
@@ -40,11 +46,15 @@ class DiffusionSolver {
 
     /// Explicit steps are stable up to this.
     double bound() const;
-    /// Evaluates the coefficients and takes n steps: FSI's, or n times α = 1. Checks that the values are finite
+    /// The step to use: dt, or 0.9 of the bound, or for ADI, which has none, 20 times as much. InvalidInput for a
+    /// dt above the bound.
+    double step(Stepper stepper, const std::optional<double>& dt) const;
+    /// Evaluates the coefficients and takes n steps: FSI's, n times α = 1, or n semi-implicit ones. Checks that the values are finite
     /// and that their mean stays where it was; NumericalError.
     void cycle(Stepper stepper, int n, double tau, const Progress& progress = {});
     /// Takes the cycles and adds them to the report's steps, time, cycles; its dt becomes τ.
-    void run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report, const Progress& progress = {});
+    void run(Stepper stepper, const std::vector<CycleRun>& cycles, HyperdiffusionReport& report,
+             const Progress& progress = {});
     /// Voxels, means, what was removed, memory.
     void describe(HyperdiffusionReport& report) const;
 
@@ -52,12 +62,8 @@ class DiffusionSolver {
     double mean_before() const { return mean_before_; }
     double mean(std::size_t field = 0) const { return summary_[field].mean() + offset_; }
     bool constant_coefficients() const { return sigma_.kind == EdgeScale::Kind::infinite; }
-    /// From now on a field of random signs b is taken through the same frozen operators, so that `trace` tells how
-    /// much of itself a voxel keeps.
-    void start_probe();
-    /// b · P b / N, an estimate of the mean diagonal element of the operator P that led from X to u
-    /// (Hutchinson 1990); 1 before the first cycle.
-    double trace() const;
+    /// Back to u = X.
+    void reset();
     /// Root mean square of X − u over the active voxels, of the first field.
     double removed() const;
     /// Writes the first field into the grid's active voxels; with two fields their difference.
@@ -70,6 +76,8 @@ class DiffusionSolver {
         stencil::ShiftedField now, before;
         std::vector<stencil::BlockField> diffusivities;  // by term; empty with constant coefficients
     };
+    void run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report, const Progress& progress);
+    void implicit_step(double tau);
     void freeze(std::size_t field);
     stencil::SweepPlan plan();
     void check();
@@ -78,7 +86,6 @@ class DiffusionSolver {
     stencil::BlockLayout layout_;
     std::vector<Field> fields_;
     std::vector<State> states_;
-    bool probe_ = false;         // the last field is the probe
     stencil::BlockField input_;  // X, where it is a target
     std::vector<stencil::FieldSummary> summary_;
     EdgeScale sigma_;

@@ -19,12 +19,18 @@ void require(bool holds, const std::string& message) {
     if (!holds) throw InvalidInput(message);
 }
 
+int highest_order(const HyperdiffusionOptions& o) {
+    int q = 0;
+    for (const DiffusionTerm& t : o.terms) q = std::max(q, t.order);
+    return q;
+}
+
 /// What the options ask for, given the largest step.
 std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
-    if (!o.steps) return {cycles_for_time(o.stepper, *o.time, largest, o.cycle, o.min_cycles)};
+    if (o.time) return cycles_for_time(o.stepper, *o.time, largest, {highest_order(o), o.cycle, o.min_cycles});
     if (o.stepper != Stepper::fsi) return {{*o.steps, 1, largest}};
     std::vector<CycleRun> plan;
-    const int cycles = std::max(o.min_cycles, (*o.steps + o.cycle - 1) / o.cycle);
+    const int longest = o.cycle.value_or(20), cycles = std::max(o.min_cycles, (*o.steps + longest - 1) / longest);
     for (int c = 0, done = 0; c < cycles; ++c) {
         const int end = static_cast<int>(static_cast<std::int64_t>(*o.steps) * (c + 1) / cycles);
         if (end > done) plan.push_back({1, end - done, largest});
@@ -32,6 +38,64 @@ std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
     }
     return plan;
 }
+
+/// Takes growing cycles until what was removed reaches the noise (discrepancy principle), or a limit of steps.
+/// Where the last cycle went beyond, all is done once more up to the time between.
+class UntilNoiseIsGone {
+ public:
+    UntilNoiseIsGone(DiffusionSolver& solver, const HyperdiffusionOptions& o, double largest, double noise)
+        : solver_(solver), options_(o), largest_(largest), noise_(noise) {}
+
+    void run(HyperdiffusionReport& report, const Progress& progress) {
+        int n = growing_cycle(highest_order(options_), 0);
+        double time = 0, removed = 0;
+        for (int k = 0; cycles_.empty() || report.steps < most_steps; ++k) {
+            if (k > 0) n = std::min(options_.cycle.value_or(300), growing_cycle(highest_order(options_), k));
+            take({1, n, largest_}, report, progress);
+            const double now = solver_.removed();
+            if (now >= noise_) {
+                if (now > (1 + tolerance) * noise_) go_back(time, removed, now, report, progress);
+                return;
+            }
+            time = report.time;
+            removed = now;
+        }
+    }
+
+ private:
+    static constexpr int most_steps = 300;
+    static constexpr double tolerance = 0.01;
+
+    void take(const CycleRun& cycle, HyperdiffusionReport& report, const Progress& progress) {
+        cycles_.push_back(cycle);
+        solver_.run(Stepper::fsi, std::vector<CycleRun>{cycle}, report,
+                    progress.part(std::min(1.0, report.steps / double(most_steps)),
+                                  std::min(1.0, (report.steps + cycle.n) / double(most_steps))));
+    }
+
+    /// Between (time, removed) and (report.time, now) what is removed goes about with the logarithm of the time.
+    /// From nothing on, with the square root of it.
+    void go_back(double time, double removed, double now, HyperdiffusionReport& report, const Progress& progress) {
+        const double share = (noise_ - removed) / (now - removed);
+        const double until = time > 0 ? time * std::pow(report.time / time, share) : report.time * share * share;
+        cycles_.pop_back();
+        const std::vector<CycleRun> again = cycles_;
+        const bool first = again.empty();
+        report.steps = report.cycles = 0;
+        report.time = 0;
+        solver_.reset();
+        solver_.run(Stepper::fsi, again, report, progress);
+        solver_.run(Stepper::fsi,
+                    cycles_for_time(Stepper::fsi, until - report.time, largest_,
+                                    {highest_order(options_), 300, first ? options_.min_cycles : 1}),
+                    report, progress);
+    }
+
+    DiffusionSolver& solver_;
+    const HyperdiffusionOptions& options_;
+    double largest_, noise_;
+    std::vector<CycleRun> cycles_;
+};
 
 }  // namespace
 
@@ -87,8 +151,9 @@ void HyperdiffusionOptions::check() const {
     require(!time || (std::isfinite(*time) && *time >= 0), "the time is a number, 0 or more");
     require(!steps || *steps >= 0, "the number of steps is 0 or more");
     require(!(time && steps), "give the time or the number of steps, not both");
+    require(time || steps || stepper == Stepper::fsi, "an automatic time needs the stepper fsi");
     require(!dt || (std::isfinite(*dt) && *dt > 0), "dt is a number above 0");
-    require(cycle >= 1 && cycle <= 200, "a cycle has 1 to 200 steps");
+    require(!cycle || (*cycle >= 1 && *cycle <= 300), "a cycle has 1 to 300 steps");
     require(min_cycles >= 1 && min_cycles <= 1000000, "the least number of cycles is 1 or more");
     require(std::isfinite(fidelity) && fidelity >= 0, "the fidelity is a number, 0 or more");
 }
@@ -115,11 +180,14 @@ HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const Hyperdiffusion
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
     if (grid.activeVoxelCount() == 0) return report;
+    report.automatic = !options.time && !options.steps;
+    if (report.automatic) report.noise = estimate_noise(grid);
     DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma);
-    const std::vector<CycleRun> plan = plan_of(options, checked_step(options.dt, solver.bound()));
-    for (std::size_t i = 0; i < plan.size(); ++i)
-        solver.run(options.stepper, plan[i], report,
-                   progress.part(double(i) / double(plan.size()), double(i + 1) / double(plan.size())));
+    const double step = solver.step(options.stepper, options.dt);
+    if (!report.automatic)
+        solver.run(options.stepper, plan_of(options, step), report, progress);
+    else if (report.noise > 0)
+        UntilNoiseIsGone(solver, options, step, report.noise).run(report, progress);
     solver.describe(report);
     if (report.steps) solver.store(grid);
     return report;

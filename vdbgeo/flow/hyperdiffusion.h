@@ -43,14 +43,14 @@ enum class Stepper {
 struct HyperdiffusionOptions {
     std::vector<DiffusionTerm> terms{{0, 1.0}};  ///< orders differ
     EdgeScale sigma;
-    /// Diffusion time, ≥ 0; 0 gives the input back. Unset, with `steps` unset too: as long as the noise
-    /// takes (see hyperdiffuse).
+    /// Diffusion time, ≥ 0; 0 gives the input back. Unset, with `steps` unset too: until the root mean square of
+    /// X − u reaches the noise (noise.h), the discrepancy principle, and 300 steps or a few more at most.
     std::optional<double> time;
     std::optional<int> steps;   ///< applications of the operator; with `dt`, instead of `time`
     std::optional<double> dt;   ///< step; at most the stability bound. Unset: 0.9 of it
     Stepper stepper = Stepper::fsi;
-    int cycle = 20;             ///< steps in a cycle of frozen coefficients, at most, 1…200
-    int min_cycles = 1;         ///< cycles at least, so that σ and d follow u
+    std::optional<int> cycle;   ///< steps in a cycle of frozen coefficients, at most, 1…300; unset: they grow
+    int min_cycles = 3;         ///< cycles at least, so that σ and d follow u, and fine noise is damped well
     double fidelity = 0;        ///< β ≥ 0 of e = β (X − u)
 
     /// Throws InvalidInput for values out of range and for options that exclude each other.

@@ -22,6 +22,10 @@ struct Command {
 Command info_command();
 Command convert_command();
 Command phantom_command();
+Command denoise_command();
+Command edges_command();
+Command transform_command();
+Command flow_command();
 Command surface_command();
 Command measure_command();
 Command render_command();

@@ -255,3 +255,42 @@ TEST(Plot, EmptyCountsAndBadRangesAreErrors) {
     EXPECT_THROW(plot_histogram({1}, 0, 1, small), InvalidInput);
     EXPECT_NO_THROW(plot_histogram({0, 0}, 0, 1));
 }
+
+// What a curve paints, column by column: the middle of its pixels.
+TEST(Plot, APowerOfTenIsAStraightCurveOnALogarithmicAxis) {
+    Curve curve{"decay", {}, {}, {1, 0, 0}};
+    for (int i = 0; i <= 50; ++i) {
+        curve.x.push_back(0.01 * i);
+        curve.y.push_back(std::pow(10.0, -0.1 * i));
+    }
+    curve.name.clear();  // the legend has its colour too
+    const Image image = plot_curves({curve}, true);
+    std::vector<Vec2d> middles;
+    for (int x = 0; x < image.width; ++x) {
+        double sum = 0, n = 0;
+        for (int y = 0; y < image.height; ++y) {
+            const std::uint8_t* p = image.at(x, y);
+            if (p[0] < 250 || p[1] > 5 || p[2] > 5) continue;
+            sum += y;
+            ++n;
+        }
+        if (n > 0) middles.emplace_back(x, sum / n);
+    }
+    ASSERT_GT(middles.size(), 500u);
+    const Vec2d first = middles[20], last = middles[middles.size() - 20];
+    EXPECT_GT(last.y() - first.y(), 200);
+    for (std::size_t i = 20; i + 20 < middles.size(); ++i)
+        EXPECT_NEAR(
+            middles[i].y(),
+            first.y() + (middles[i].x() - first.x()) * (last.y() - first.y()) / (last.x() - first.x()), 1.5);
+}
+
+TEST(Plot, CurvesWithoutValuesGiveEmptyAxesAndBadOnesAreErrors) {
+    const Image axes = plot_curves({}, true);
+    EXPECT_EQ(plot_curves({{"", {1, 2}, {0, std::nan("")}, {1, 0, 0}}}, true).width, axes.width);
+    EXPECT_NO_THROW(plot_curves({{"", {1, 2}, {-1, 1}, {1, 0, 0}}}, false));
+    EXPECT_NO_THROW(plot_curves({{"", {0, 0}, {1, 1}, {1, 0, 0}}}, true));
+    EXPECT_THROW(plot_curves({{"", {1, 2}, {1}, {1, 0, 0}}}, true), InvalidInput);
+    EXPECT_THROW(plot_curves({{"", {-1, 2}, {1, 1}, {1, 0, 0}}}, true), InvalidInput);
+    EXPECT_THROW(plot_curves({{"", {std::nan(""), 2}, {1, 1}, {1, 0, 0}}}, true), InvalidInput);
+}

@@ -24,4 +24,16 @@ struct PlotOptions {
 Image plot_histogram(const std::vector<double>& counts, double lo, double hi,
                      const PlotOptions& options = {});
 
+/// A curve: points joined by lines, left out where y is not finite (or not positive on a logarithmic axis).
+struct Curve {
+    std::string name;  ///< in the legend; empty: not there
+    std::vector<double> x, y;
+    Vec3f colour{0.33f, 0.53f, 0.72f};  ///< sRGB
+};
+
+/// Curves over a linear x axis from 0, with y linear or by powers of ten (at most eight of them, the
+/// highest). Errors: InvalidInput for a curve whose x and y differ in number, or whose x is not finite or
+/// below 0.
+Image plot_curves(const std::vector<Curve>& curves, bool logarithmic, const PlotOptions& options = {});
+
 }  // namespace vdbgeo

@@ -50,6 +50,10 @@ double round_down(double limit) {
     return power;
 }
 
+std::string power_of_ten(int exponent) {
+    return exponent == 0 ? "1" : exponent == 1 ? "10" : "10" + raised(exponent);
+}
+
 Ticks make_ticks(double low, double high, int most) {
     Ticks ticks;
     if (!(high > low)) return {{low}, {with_minus(fmt::format("{:.6g}", low))}};

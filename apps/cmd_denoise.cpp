@@ -1,0 +1,224 @@
+// vdbgeo denoise: noise removal by hyperdiffusion, or by the filters that everybody knows.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <optional>
+
+#include "apps/command.h"
+#include "apps/flow_flags.h"
+#include "apps/map_filter.h"
+#include "apps/preview.h"
+#include "apps/reports.h"
+#include "apps/stages.h"
+#include "vdbgeo/flow/baselines.h"
+#include "vdbgeo/flow/noise.h"
+#include "vdbgeo/volume/map_statistics.h"
+
+namespace vdbgeo::app {
+namespace {
+
+struct DenoiseOptions {
+    MapFilterFlags files;
+    DiffusionFlags diffusion;
+    std::string method = "hyperdiffusion";
+    double blur = BilateralOptions().sigma;
+    std::optional<double> range;
+    int radius = 1;
+    /// Flags that mean something to some methods only.
+    std::vector<CLI::Option*> for_diffusion, for_blur, for_range, for_radius;
+
+    bool diffuses() const { return method == "hyperdiffusion" || method == "perona-malik"; }
+    void check_flags() const;
+    void finish(Session& session);
+};
+
+void DenoiseOptions::check_flags() const {
+    const bool blurs = method == "gaussian" || method == "bilateral";
+    const std::vector<std::pair<const std::vector<CLI::Option*>*, bool>> groups{
+        {&for_diffusion, diffuses()},
+        {&for_blur, blurs},
+        {&for_range, method == "bilateral"},
+        {&for_radius, method == "median"}};
+    for (const auto& [flags, wanted] : groups)
+        for (const CLI::Option* flag : *flags)
+            if (flag->count() > 0 && !wanted)
+                throw UsageError(fmt::format("{} means nothing to --method {}", flag->get_name(), method));
+}
+
+void DenoiseOptions::finish(Session& session) {
+    files.finish();
+    check_flags();
+    check_map_output(files.out, session);
+    check_usage(BilateralOptions{blur, range.value_or(1)});
+    if (method == "perona-malik") {
+        if (!diffusion.orders.empty())
+            throw UsageError("--method perona-malik is --order 0: give one of them");
+        diffusion.orders = "0";
+    }
+    diffusion.finish();
+}
+
+/// What was chosen and done, for the result and in words; what is empty or null does not apply.
+struct Outcome {
+    Json numbers;
+    std::vector<std::string> lines;
+    std::string history;
+    double removed = 0;
+};
+
+std::string noise_text(double noise) { return fmt::format("{:.4g} (estimated standard deviation)", noise); }
+
+Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress) {
+    const HyperdiffusionOptions& options = o.diffusion.options;
+    const HyperdiffusionReport r = naming(o.files.in, [&] { return hyperdiffuse(grid, options, progress); });
+    std::vector<int> orders;
+    std::vector<double> diffusivities;
+    for (const DiffusionTerm& term : options.terms) {
+        orders.push_back(term.order);
+        diffusivities.push_back(term.diffusivity);
+    }
+    Outcome out;
+    out.removed = r.removed;
+    Json& j = out.numbers;
+    j["order"] = orders;
+    j["diffusivity"] = diffusivities;
+    j["sigma"] = options.sigma.text();
+    j["stepper"] = name_of(options.stepper);
+    j["fidelity"] = options.fidelity;
+    j["automatic"] = r.automatic;
+    j["noise"] = r.automatic ? Json(r.noise) : Json();
+    j.update(report_json(r));
+    const std::string settings = fmt::format(
+        "order {}, diffusivity {}, sigma {}{}", fmt::join(orders, ","), fmt::join(diffusivities, ","),
+        options.sigma.text(), options.fidelity > 0 ? fmt::format(", fidelity {:.6g}", options.fidelity) : "");
+    out.lines = {fmt::format("method      {}, {}", o.method, settings)};
+    if (r.automatic) out.lines.push_back(fmt::format("noise       {}", noise_text(r.noise)));
+    out.lines.push_back(fmt::format("time        {} ({}){}", steps_text(r), name_of(options.stepper),
+                                    r.automatic ? ": as long as the noise takes" : ""));
+    out.history = fmt::format("{}, time {:.9g}{}, {} steps, dt {:.9g}, {}", settings, r.time,
+                              r.automatic ? " (auto)" : "", r.steps, r.dt, name_of(options.stepper));
+    return out;
+}
+
+Outcome filter(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress) {
+    Outcome out;
+    Json& j = out.numbers;
+    const openvdb::FloatGrid::Ptr before = grid.deepCopy();
+    const Moments moments = active_moments(grid);
+    const double noise = estimate_noise(grid);
+    j["automatic"] = o.method == "bilateral" && !o.range;
+    j["noise"] = noise;
+    naming(o.files.in, [&] {
+        if (o.method == "gaussian") {
+            gaussian_filter(grid, o.blur, progress);
+            j["blur"] = o.blur;
+            out.history = fmt::format("blur {}", o.blur);
+        } else if (o.method == "median") {
+            median_filter(grid, o.radius, progress);
+            j["radius"] = o.radius;
+            out.history = fmt::format("radius {}", o.radius);
+        } else {
+            const double range = o.range ? *o.range : noise > 0 ? 2.5 * noise : 1;
+            bilateral_filter(grid, {o.blur, range}, progress);
+            j["blur"] = o.blur;
+            j["range"] = range;
+            out.history = fmt::format("blur {}, range {:.6g}", o.blur, range);
+        }
+    });
+    j["active_voxels"] = moments.count;
+    j["mean_before"] = moments.mean;
+    j["mean_after"] = active_moments(grid).mean;
+    out.removed = rms_difference(grid, *before);
+    out.lines = {fmt::format("method      {}, {}", o.method, out.history),
+                 fmt::format("noise       {}", noise_text(noise))};
+    return out;
+}
+
+void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Session& session) {
+    if (session.json || session.quiet) return;
+    for (const std::string& line : outcome.lines) session.say(line);
+    const double share = rms_before > 0 ? 100 * outcome.removed / rms_before : 0;
+    session.say(
+        fmt::format("removed     {:.4g} (root mean square), {:.1f} % of the map's deviation of {:.4g}",
+                    outcome.removed, share, rms_before));
+    session.say(fmt::format("mean        {:.6g}, was {:.6g}", j["mean_after"].get<double>(),
+                            j["mean_before"].get<double>()));
+    session.say(fmt::format("voxels      {}", j["active_voxels"].get<std::uint64_t>()));
+}
+
+void run_denoise(const DenoiseOptions& o, Session& session) {
+    Json seconds;
+    Clock clock;
+    const double state = o.diffuses() ? 20.2 : 16.4;  // bytes a voxel: grid and fields
+    MapFile in = read_for_filter(o.files, {"denoising", state}, session);
+    need_density(o.files.in, in);
+    seconds["read"] = clock.lap();
+    Preview preview;
+    const bool shown = !o.files.preview.empty();
+    if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
+    const double rms_before = active_moments(*in.map.grid).statistics().rms;
+    seconds["preview"] = clock.lap();
+    openvdb::FloatGrid& grid = *in.map.grid;
+    const Progress progress = session.stage("denoising");
+    const Outcome outcome = o.diffuses() ? diffuse(o, grid, progress) : filter(o, grid, progress);
+    finish_map(in.map, fmt::format("denoised: {}, {}", o.method, outcome.history));
+    seconds["compute"] = clock.lap();
+    Json j = filter_result(o.files, in);
+    j["method"] = o.method;
+    j.update(outcome.numbers);
+    j["removed"] = outcome.removed;
+    j.update(statistics_json(in.map.statistics));
+    if (shown) preview.add("after", in.map, Preview::Greys::as_first, session.stage("preview"));
+    seconds["preview"] = seconds["preview"].get<double>() + clock.lap();
+    write_filtered(o.files, in.map, j, session);
+    seconds["write"] = clock.lap();
+    if (shown) {
+        preview.write(o.files.preview);
+        j["preview"] = o.files.preview;
+    } else {
+        seconds.erase("preview");
+    }
+    j["seconds"] = seconds;
+    say_outcome(outcome, j, rms_before, session);
+    session.result(j);
+}
+
+}  // namespace
+
+Command denoise_command() {
+    return {
+        "denoise",
+        "Take the noise out of a map by hyperdiffusion; or by a Gaussian, a median, a bilateral filter",
+        "  vdbgeo denoise emd_1080.map smooth.mrc --preview smooth.png\n"
+        "  vdbgeo denoise emd_1080.map smooth.vdb --order 1 --sigma local:3 --time 2\n"
+        "  vdbgeo denoise emd_1080.map median.mrc --method median --radius 1",
+        [](CLI::App& app) {
+            auto o = std::make_shared<DenoiseOptions>();
+            app.add_option("--method", o->method,
+                           "hyperdiffusion, perona-malik (its order 0), gaussian, median or bilateral")
+                ->check(CLI::IsMember({"hyperdiffusion", "perona-malik", "gaussian", "median", "bilateral"})
+                            .description(""))
+                ->capture_default_str();
+            o->for_diffusion = o->diffusion.add(app);
+            o->for_blur = {app.add_option("--blur", o->blur,
+                                          "Standard deviation of the gaussian and the bilateral filter in "
+                                          "voxels, to 10.5")
+                               ->capture_default_str()};
+            o->for_range = {app.add_option("--range", o->range,
+                                           "Difference in density, in the map's units, that the bilateral "
+                                           "filter keeps [2.5 times the estimated noise]")};
+            o->for_radius = {
+                app.add_option("--radius", o->radius, "Radius of the median's window in voxels, to 8")
+                    ->check(CLI::Range(0, 8).description(""))
+                    ->capture_default_str()};
+            o->files.add(app,
+                         "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
+            o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
+            return [o](Session& session) {
+                o->finish(session);
+                run_denoise(*o, session);
+            };
+        }};
+}
+
+}  // namespace vdbgeo::app

@@ -1,0 +1,91 @@
+// vdbgeo edges: edges of a map as the difference of two coupled diffusions.
+#include <fmt/format.h>
+
+#include "apps/command.h"
+#include "apps/flow_flags.h"
+#include "apps/map_filter.h"
+#include "apps/preview.h"
+#include "apps/reports.h"
+#include "apps/stages.h"
+
+namespace vdbgeo::app {
+namespace {
+
+struct EdgesOptions {
+    MapFilterFlags files;
+    HighPassFlags high_pass;
+};
+
+void run_edges(const EdgesOptions& o, Session& session) {
+    const HighPassOptions& options = o.high_pass.options;
+    Json seconds;
+    Clock clock;
+    MapFile in = read_for_filter(o.files, {"finding edges", 32.2}, session);
+    need_density(o.files.in, in);
+    seconds["read"] = clock.lap();
+    Preview preview;
+    const bool shown = !o.files.preview.empty();
+    if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
+    clock.lap();
+    const Progress progress = session.stage("edges");
+    const HyperdiffusionReport r =
+        naming(o.files.in, [&] { return coupled_high_pass(*in.map.grid, options, progress); });
+    clear_inactive(*in.map.grid);
+    finish_map(in.map,
+               fmt::format("edges: order {}, diffusivities {} and {}, coupling {} and {}, sigma {}, time "
+                           "{:.9g}, {} steps, dt {:.9g}, {}",
+                           options.order, options.slow, options.fast, options.coupling_u, options.coupling_v,
+                           options.sigma.text(), r.time, r.steps, r.dt, name_of(options.stepper)));
+    seconds["compute"] = clock.lap();
+    Json j = filter_result(o.files, in);
+    j.update({{"order", options.order},
+              {"slow", options.slow},
+              {"fast", options.fast},
+              {"coupling_u", options.coupling_u},
+              {"coupling_v", options.coupling_v},
+              {"sigma", options.sigma.text()},
+              {"stepper", name_of(options.stepper)}});
+    j.update(report_json(r));
+    j.update(statistics_json(in.map.statistics));
+    if (shown) preview.add("edges", in.map, Preview::Greys::own, session.stage("preview"));
+    clock.lap();
+    write_filtered(o.files, in.map, j, session);
+    seconds["write"] = clock.lap();
+    if (shown) {
+        preview.write(o.files.preview);
+        j["preview"] = o.files.preview;
+    }
+    j["seconds"] = seconds;
+    if (!session.json && !session.quiet) {
+        session.say(fmt::format("diffusion   order {}, diffusivities {} and {}, sigma {}", options.order,
+                                options.slow, options.fast, options.sigma.text()));
+        session.say(fmt::format("coupling    {} and {}", options.coupling_u, options.coupling_v));
+        session.say(fmt::format("time        {} ({})", steps_text(r), name_of(options.stepper)));
+        session.say(fmt::format("edges       {:.4g} to {:.4g}, rms {:.4g}", in.map.statistics.min,
+                                in.map.statistics.max, in.map.statistics.rms));
+        session.say(fmt::format("voxels      {}", r.active_voxels));
+    }
+    session.result(j);
+}
+
+}  // namespace
+
+Command edges_command() {
+    return {
+        "edges", "Find the edges of a map: the difference of two coupled diffusions, a fast and a slow one",
+        "  vdbgeo edges emd_1080.map edges.mrc --time 10", [](CLI::App& app) {
+            auto o = std::make_shared<EdgesOptions>();
+            o->high_pass.add(app);
+            o->files.add(app,
+                         "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
+            o->files.add_preview(app, "Picture (PNG) of sections and power spectra of the map and its edges");
+            return [o](Session& session) {
+                o->files.finish();
+                o->high_pass.finish();
+                check_map_output(o->files.out, session);
+                run_edges(*o, session);
+            };
+        }};
+}
+
+}  // namespace vdbgeo::app

@@ -1,0 +1,56 @@
+// A picture that shows what a command did to a map: sections through the middle and power spectra.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/view/image.h"
+#include "vdbgeo/volume/density_map.h"
+#include "vdbgeo/volume/power_spectrum.h"
+
+namespace vdbgeo::app {
+
+/// Collects maps, which can be changed or dropped afterwards, and draws a row for each: the sections through
+/// the middle across z, y and x, all at one scale; below them the radial power spectra, logarithmic, in one
+/// plot.
+class Preview {
+ public:
+    enum class Greys {
+        as_first,  ///< black and white stand for the same densities as in the first row
+        own        ///< for those of the row itself
+    };
+
+    /// Takes the sections and the spectrum of a map.
+    void add(const std::string& name, const DensityMap& map, Greys greys, const Progress& progress = {});
+
+    Image draw() const;
+    /// Draws and writes the PNG.
+    void write(const std::string& path) const;
+
+ private:
+    /// Samples of a section, rows from bottom to top.
+    struct Section {
+        std::string title;
+        int width = 0, height = 0;
+        double step_x = 1, step_y = 1;  ///< Å
+        std::vector<float> values;
+    };
+    struct Row {
+        std::string name;
+        std::array<Section, 3> sections;
+        double black = 0, white = 1;
+        PowerSpectrum spectrum;
+    };
+
+    static Section take_section(const DensityMap& map, int across);
+    static void set_greys(Row& row);
+    static void draw_section(Image& image, const Row& row, const Section& section, int left, int top,
+                             int width, int height);
+    Image draw_spectra(int width) const;
+
+    std::vector<Row> rows_;
+};
+
+}  // namespace vdbgeo::app

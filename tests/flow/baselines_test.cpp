@@ -61,7 +61,7 @@ std::string name_of(const testing::TestParamInfo<std::string>& info) {
 INSTANTIATE_TEST_SUITE_P(Masks, BaselinesOn, testing::ValuesIn(test::sparse_kinds()), name_of);
 
 TEST(Baselines, WidestWindows) {
-    const auto input = test::box_grid(test::box_of(Coord(20, -3, 57), 20, 11, 14), [](const Coord& c) {
+    const auto input = test::box_grid(test::box_of(Coord(20, -3, 57), 18, 7, 12), [](const Coord& c) {
         return std::sin(c.x() * 12.9898 + c.y() * 78.233 + c.z() * 37.719);
     });
     const Oracle oracle(*input);

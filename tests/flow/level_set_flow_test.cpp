@@ -71,7 +71,7 @@ double shrunk_sphere_error(double radius) {
     const double time = radius * radius / 8;
     const LevelSetFlowReport report = level_set_flow(*grid, options(SurfaceFlow::mean_curvature, time));
     EXPECT_NEAR(report.volume_before, 4.0 / 3 * M_PI * std::pow(radius, 3), 2e-3 * report.volume_before);
-    EXPECT_NEAR(report.volume_after, openvdb::tools::levelSetVolume(*grid), 0.02 * report.volume_after);
+    EXPECT_NEAR(report.volume_after, openvdb::tools::levelSetVolume(*grid), 0.03 * report.volume_after);
     EXPECT_NEAR(report.time, time, 1e-9 * time);
     EXPECT_EQ(report.active_voxels, grid->activeVoxelCount());
     EXPECT_FALSE(report.vanished);
@@ -124,19 +124,19 @@ TEST(MeanCurvatureFlow, TheHoleOfAThickTorusCloses) {
     EXPECT_EQ(components(*grid), 1u);
 }
 
-TEST(MeanCurvatureFlow, TwoBallsThatTouchBecomeOne) {
+TEST(SurfaceDiffusion, TwoBallsThatTouchBecomeOne) {
     const auto two = [](const Vec3d& p) {
-        return std::min((p - Vec3d(-7.6, 0, 0)).length(), (p - Vec3d(7.6, 0, 0)).length()) - 8;
+        return std::min((p - Vec3d(-5.6, 0, 0)).length(), (p - Vec3d(5.6, 0, 0)).length()) - 6;
     };
-    auto grid = level_set_of(22, two);
-    const double neck_before = std::sqrt(64 - 7.6 * 7.6);
-    const LevelSetFlowReport report = level_set_flow(*grid, options(SurfaceFlow::surface_diffusion, 30));
+    auto grid = level_set_of(17, two);
+    const double neck_before = std::sqrt(36 - 5.6 * 5.6);
+    const LevelSetFlowReport report = level_set_flow(*grid, options(SurfaceFlow::surface_diffusion, 6));
     EXPECT_EQ(components(*grid), 1u);
     double neck = 0;
     test::for_crossings(*grid, [&](const Vec3d& p) {
         if (std::abs(p[0]) < 0.6) neck = std::max(neck, std::hypot(p[1], p[2]));
     });
-    EXPECT_GT(neck, neck_before + 1);
+    EXPECT_GT(neck, neck_before + 0.5);
     EXPECT_NEAR(report.volume_after, report.volume_before, 0.005 * report.volume_before);
 }
 
@@ -167,19 +167,39 @@ TEST(SurfaceDiffusion, APerturbedSphereBecomesRoundAndKeepsItsVolume) {
     EXPECT_NEAR(openvdb::tools::levelSetVolume(*grid), volume, 0.01 * volume);
 }
 
-TEST(SurfaceDiffusion, ASmallWaveDecaysAtItsRate) {
-    // The second harmonic: (l−1) l (l+1) (l+2) / R⁴ with l = 2.
-    const double radius = 9, time = 200;
-    auto grid = level_set_of(14, [&](const Vec3d& p) {
-        const double r = p.length() + 1e-9, c = p[2] / r;
-        return r - radius - 0.25 * (3 * c * c - 1);
+/// Amplitude of the second zonal harmonic in the radius, by least squares.
+double wave(const FloatGrid& grid) {
+    double n = 0, h = 0, hh = 0, r = 0, rh = 0;
+    test::for_crossings(grid, [&](const Vec3d& p) {
+        const double length = p.length(), c = p[2] / length, harmonic = (3 * c * c - 1) / 2;
+        n += 1;
+        h += harmonic;
+        hh += harmonic * harmonic;
+        r += length;
+        rh += length * harmonic;
     });
-    const double spread = radii(*grid).spread();
-    auto o = options(SurfaceFlow::surface_diffusion, time);
-    o.dt = 20;
-    level_set_flow(*grid, o);
-    const double expected = std::exp(-24 / std::pow(radius, 4) * time);
-    EXPECT_NEAR(radii(*grid).spread() / spread, expected, 0.15 * expected);
+    return (n * rh - h * r) / (n * hh - h * h);
+}
+
+TEST(SurfaceDiffusion, ASmallWaveDecaysAtItsRate) {
+    // (l−1) l (l+1) (l+2) / R⁴ with l = 2, and nearer to it for smaller steps.
+    const double radius = 9, time = 100, rate = 24 / std::pow(radius, 4);
+    std::array<double, 2> found;
+    for (std::size_t i = 0; i < 2; ++i) {
+        auto grid = level_set_of(14, [&](const Vec3d& p) {
+            const double r = p.length() + 1e-9, c = p[2] / r;
+            return r - radius - 0.25 * (3 * c * c - 1);
+        });
+        const double before = wave(*grid);
+        EXPECT_NEAR(before, 0.5, 0.02);
+        auto o = options(SurfaceFlow::surface_diffusion, time);
+        o.dt = i == 0 ? 20 : 5;
+        level_set_flow(*grid, o);
+        found[i] = -std::log(wave(*grid) / before) / time;
+    }
+    EXPECT_NEAR(found[0], rate, 0.22 * rate);
+    EXPECT_NEAR(found[1], rate, 0.12 * rate);
+    EXPECT_LT(std::abs(found[1] - rate), std::abs(found[0] - rate));
 }
 
 double ratio(const FloatGrid& grid) {
@@ -288,12 +308,17 @@ TEST(LevelSetFlow, WhatItDoesNotTakeIsRefused) {
 
 TEST(LevelSetFlow, AStepThatGoesTooFarIsAnError) {
     auto grid = level_set_of(12, [](const Vec3d& p) {
-        return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])}) - 7;  // a cube has sharp edges
+        return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])}) - 5;  // a cube has sharp edges
     });
     auto o = options(SurfaceFlow::surface_diffusion, 1e6);
-    o.dt = 1e5;
+    o.dt = 100;
     const auto before = grid->deepCopy();
-    EXPECT_THROW(level_set_flow(*grid, o), NumericalError);
+    try {
+        level_set_flow(*grid, o);
+        FAIL() << "not noticed";
+    } catch (const NumericalError& e) {
+        EXPECT_NE(std::string(e.what()).find("take a smaller one"), std::string::npos) << e.what();
+    }
     expect_same(*before, *grid);
 }
 

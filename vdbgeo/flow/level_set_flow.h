@@ -44,11 +44,11 @@ struct LevelSetFlowReport {
 /// every five steps. The others: V at the surface by the closest point method, and the semi-implicit step of
 /// Smereka (2003), (I + dt S Δ²) φ⁺ = φ − dt V + dt S Δ² φ, with S the coefficient of Δ_s² in V, solved on
 /// the band by conjugate gradients; distances anew every step. Unset, dt is such that the surface moves 0.1
-/// voxel a step, and 0.25…256 voxel⁴: first order, features that move less than that are slower than they
-/// ought to be. Curvatures beyond 1/voxel and speeds beyond 0.4 are cut. Surface diffusion: what the volume
-/// drifts in a step is taken back by moving the whole surface evenly, so that of several components only the
-/// sum is kept. Accurate for radii of 6 voxels and more. While it works the band is 6 voxels wide on either
-/// side.
+/// voxel a step, and 0.25…256 voxel⁴: first order in time; waves on a sphere of 9 voxels decay 9 % too slowly
+/// at dt = 5 and 18 % at dt = 20. Curvatures beyond 1/voxel and speeds beyond 0.4 are cut. Surface diffusion:
+/// what the volume drifts in a step is taken back by moving the whole surface evenly, so that of several
+/// components only the sum is kept. Accurate for radii of 6 voxels and more. While it works the band is 6
+/// voxels wide on either side.
 ///
 /// Throws InvalidInput for a grid of another class, with voxels that are not cubic or values that are not
 /// finite, for a dt above the bound; NumericalError where it diverges; Cancelled. The grid is written to at

@@ -220,8 +220,8 @@ int solve_biharmonic(const BlockLayout& layout, double a, const BlockField& righ
         for_floats(delta, [=](std::size_t k) { p[k] = r[k] + keep * p[k]; });
         now = next;
     }
-    throw NumericalError(
-        fmt::format("the implicit step was not solved to {} in {} iterations", tolerance, most));
+    throw NumericalError(fmt::format(
+        "the implicit step was not solved to {} in {} iterations; take a smaller one", tolerance, most));
 }
 
 double largest(const BlockField& field) {

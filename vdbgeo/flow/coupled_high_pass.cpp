@@ -20,7 +20,7 @@ void HighPassOptions::check() const {
     require(std::isfinite(fast) && fast >= slow, "the fast diffusivity is at least the slow one");
     require(std::isfinite(coupling_u) && coupling_u >= 0 && std::isfinite(coupling_v) && coupling_v >= 0,
             "couplings are numbers, 0 or more");
-    require(sigma.radius >= 1 && sigma.radius <= 8, "the radius of a local sigma is 1 to 8");
+    sigma.check();
     require(std::isfinite(time) && time >= 0, "the time is a number, 0 or more");
     require(!dt || (std::isfinite(*dt) && *dt > 0), "dt is a number above 0");
     require(cycle >= 1 && cycle <= 200, "a cycle has 1 to 200 steps");

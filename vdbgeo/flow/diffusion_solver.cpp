@@ -16,6 +16,28 @@ namespace {
 using stencil::BlockField;
 using stencil::BlockLayout;
 
+/// ±1, a function of the voxel alone: two rounds of the splitmix64 finaliser, as the phantoms' noise has it.
+float random_sign(const openvdb::Coord& origin, std::uint64_t voxel) {
+    const auto mix = [](std::uint64_t x) {
+        x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+        x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+        return x ^ (x >> 31);
+    };
+    const auto at = [](int c) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c)); };
+    const std::uint64_t leaf = mix(mix(at(origin.x()) << 32 | at(origin.y())) ^ at(origin.z()));
+    return mix(leaf + 0x9e3779b97f4a7c15ULL * (voxel + 1)) >> 63 ? 1.0f : -1.0f;
+}
+
+/// The probe's value in every voxel of a layout, 0 in those that are not active.
+void fill_signs(const BlockLayout& layout, float* out) {
+    parallel_for(layout.brick_count(), 64, [&](std::size_t b) {
+        for (std::uint64_t i = 0; i < BlockField::brick_size; ++i) {
+            const bool on = layout.mask(b)[i >> 6] >> (i & 63) & 1;
+            out[b * BlockField::brick_size + i] = on ? random_sign(layout.origin(b), i) : 0.0f;
+        }
+    });
+}
+
 constexpr double drift_limit = 1e-3;  // of the range of X: rounding stays orders of magnitude below it
 
 }  // namespace
@@ -115,7 +137,7 @@ void DiffusionSolver::freeze(std::size_t field) {
 stencil::SweepPlan DiffusionSolver::plan() {
     stencil::SweepPlan p;
     p.weights = weights_;
-    for (std::size_t i = 0; i < fields_.size(); ++i) {
+    for (std::size_t i = 0; i < fields_.size(); ++i) {  // without the probe
         stencil::SweepField f;
         f.state = &states_[i].now;
         f.before = &states_[i].before;
@@ -127,6 +149,12 @@ stencil::SweepPlan DiffusionSolver::plan() {
             f.terms.push_back({term.order, variable ? states_[i].diffusivities[t].brick(0) : nullptr,
                                variable ? 1.0 : term.diffusivity});
         }
+        p.fields.push_back(std::move(f));
+    }
+    if (probe_) {
+        stencil::SweepField f = p.fields.front();
+        f.state = &states_.back().now;
+        f.before = &states_.back().before;
         p.fields.push_back(std::move(f));
     }
     return p;
@@ -182,6 +210,33 @@ void DiffusionSolver::check() {
     // Coupled fields exchange what they hold; the mean of each is not kept then.
     if (fields_.size() == 1 && std::abs(mean() - mean_before_) > drift_limit * std::max(range_, 1e-300))
         throw NumericalError(fmt::format("the mean drifted from {:.7g} to {:.7g}", mean_before_, mean()));
+}
+
+void DiffusionSolver::start_probe() {
+    probe_ = true;
+    states_.push_back({stencil::ShiftedField(layout_), stencil::ShiftedField(layout_), {}});
+    // The direction in which both fields go through the slabs has to be the same.
+    if (states_.back().now.forward() != states_.front().now.forward()) states_.back().now.turn();
+    if (states_.back().before.forward() != states_.front().before.forward()) states_.back().before.turn();
+    fill_signs(layout_, states_.back().now.now());
+}
+
+double DiffusionSolver::trace() const {
+    const float* now = states_.back().now.now();
+    const double sum = fixed_order_reduce(
+        layout_.brick_count(), 64, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+            double part = 0;
+            for (std::size_t b = begin; b < end; ++b)
+                for (std::size_t w = 0; w < 8; ++w)
+                    for (std::uint64_t word = layout_.mask(b)[w]; word; word &= word - 1) {
+                        const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
+                        part += random_sign(layout_.origin(b), i) * now[b * BlockField::brick_size + i];
+                    }
+            return part;
+        },
+        [](double& total, double part) { total += part; });
+    return sum / std::max(1.0, static_cast<double>(layout_.active_count()));
 }
 
 double DiffusionSolver::removed() const {

@@ -52,6 +52,12 @@ class DiffusionSolver {
     double mean_before() const { return mean_before_; }
     double mean(std::size_t field = 0) const { return summary_[field].mean() + offset_; }
     bool constant_coefficients() const { return sigma_.kind == EdgeScale::Kind::infinite; }
+    /// From now on a field of random signs b is taken through the same frozen operators, so that `trace` tells how
+    /// much of itself a voxel keeps.
+    void start_probe();
+    /// b · P b / N, an estimate of the mean diagonal element of the operator P that led from X to u
+    /// (Hutchinson 1990); 1 before the first cycle.
+    double trace() const;
     /// Root mean square of X − u over the active voxels, of the first field.
     double removed() const;
     /// Writes the first field into the grid's active voxels; with two fields their difference.
@@ -72,6 +78,7 @@ class DiffusionSolver {
     stencil::BlockLayout layout_;
     std::vector<Field> fields_;
     std::vector<State> states_;
+    bool probe_ = false;         // the last field is the probe
     stencil::BlockField input_;  // X, where it is a target
     std::vector<stencil::FieldSummary> summary_;
     EdgeScale sigma_;

@@ -44,8 +44,9 @@ EdgeScale EdgeScale::parse(const std::string& text) {
     } else if (text.rfind("local", 0) == 0) {
         char* end = nullptr;
         if (text.size() > 5) {
-            s.radius = text[5] == ':' ? static_cast<int>(std::strtol(text.c_str() + 6, &end, 10)) : 0;
-            if (!end || end == text.c_str() + 6 || *end || s.radius < 1 || s.radius > 8) s.radius = 0;
+            const long r = text[5] == ':' ? std::strtol(text.c_str() + 6, &end, 10) : 0;
+            const bool good = end && end != text.c_str() + 6 && !*end && r >= 1 && r <= 8;
+            s.radius = good ? static_cast<int>(r) : 0;
         }
         require(s.radius > 0, text + ": the radius of a local sigma is a whole number from 1 to 8 (local:2)");
     } else {
@@ -68,6 +69,12 @@ std::string EdgeScale::text() const {
     }
 }
 
+void EdgeScale::check() const {
+    require(radius >= 1 && radius <= 8, "the radius of a local sigma is 1 to 8");
+    require(kind != Kind::value || (std::isfinite(value) && value > 0), "sigma is above 0");
+    require(std::isfinite(factor) && factor > 0, "the factor of sigma is above 0");
+}
+
 void HyperdiffusionOptions::check() const {
     require(!terms.empty(), "at least one order is needed");
     std::set<int> orders;
@@ -76,10 +83,7 @@ void HyperdiffusionOptions::check() const {
         require(orders.insert(t.order).second, fmt::format("order {} is given twice", t.order));
         require(std::isfinite(t.diffusivity) && t.diffusivity > 0, "a diffusivity is a number above 0");
     }
-    require(sigma.radius >= 1 && sigma.radius <= 8, "the radius of a local sigma is 1 to 8");
-    require(sigma.kind != EdgeScale::Kind::value || (std::isfinite(sigma.value) && sigma.value > 0),
-            "sigma is above 0");
-    require(std::isfinite(sigma.factor) && sigma.factor > 0, "the factor of sigma is above 0");
+    sigma.check();
     require(!time || (std::isfinite(*time) && *time >= 0), "the time is a number, 0 or more");
     require(!steps || *steps >= 0, "the number of steps is 0 or more");
     require(!(time && steps), "give the time or the number of steps, not both");

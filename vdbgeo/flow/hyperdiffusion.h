@@ -24,6 +24,8 @@ struct EdgeScale {
     /// "local", "local:R", "global", "inf" or a number; InvalidInput for anything else.
     static EdgeScale parse(const std::string& text);
     std::string text() const;
+    /// Throws InvalidInput for values out of range.
+    void check() const;
 };
 
 /// One term of Eq 2: ∇·(d_q ∇∇^{2q} u), d_q = (−1)^q d_q0 exp(−|∇u|²/2σ_q²).

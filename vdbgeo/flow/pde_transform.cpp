@@ -24,6 +24,7 @@ void subtract(openvdb::FloatTree& a, const openvdb::FloatTree& b) {
 }  // namespace
 
 void TransformOptions::check() const {
+    sigma.check();
     if (passes.empty()) throw InvalidInput("a transform has at least one pass");
     for (const Pass& p : passes) {
         if (p.order < 0 || p.order > 15) throw InvalidInput("an order is 0 to 15");

@@ -67,7 +67,7 @@ class Sweep {
     void step(int k, int x, int margin, std::size_t field, Scratch& s) const;
     void scatter(TileGather& tile, int x, Scratch& s) const;
     PlaneRange range(int x, int margin, Scratch& s) const {
-        return {margin, rows_ - margin, stride_, spans(x, s)};
+        return {margin, rows_ - margin, stride_, spans(x, s), spans(x - 1, s), spans(x + 1, s)};
     }
     RowSpan* spans(int x, Scratch& s) const {
         return s.spans.data() + ((x % planes_ + planes_) % planes_) * rows_;
@@ -101,7 +101,7 @@ Scratch Sweep::make_scratch() const {
         if (f.terms.size() > 1) out.gathered.emplace_back(1, size, 0.0f);
         s.fields.push_back(std::move(out));
     }
-    s.spans.assign(static_cast<std::size_t>(planes_ * rows_), {0, 0});
+    s.spans.assign(static_cast<std::size_t>(planes_ * rows_), RowSpan{0, 0});
     return s;
 }
 

@@ -11,17 +11,20 @@ namespace vdbgeo::stencil {
 /// The z-range [begin, end) of a row outside of which no voxel is active; empty where begin ≥ end.
 struct RowSpan {
     std::int16_t begin, end;
+    bool solid = false;  ///< every voxel of the range is active
 };
 
 /// Kernels work on whole vectors of this many floats; rows are a multiple of it long.
 constexpr int lanes = 16;
 
 /// Rows [y_begin, y_end) of a plane: where a kernel works. Rows are `stride` floats apart; spans[y] tells which
-/// part of row y is needed. A kernel may compute more of a row: up to whole vectors.
+/// part of row y is needed. A kernel may compute more of a row: up to whole vectors. Inside
+/// of solid ranges that the four rows around share, all faces are open; `before` and `after` are the spans of the
+/// planes beside this one, not looked at where spans[y] is not solid.
 struct PlaneRange {
     int y_begin, y_end;
     std::ptrdiff_t stride;
-    const RowSpan* spans;
+    const RowSpan *spans, *before = nullptr, *after = nullptr;
 };
 
 /// A plane and those before and after it along x.

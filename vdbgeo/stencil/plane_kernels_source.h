@@ -13,46 +13,94 @@ namespace {
             z1 = (range).spans[y].end;                                              \
             z0 < z1)
 
-/// `ivdep` is true: the arrays written to are read at the same place only.
-#define VDBGEO_FOR_LANES(z, z0, z1)                             \
-    for (std::ptrdiff_t block = z0; block < z1; block += lanes) \
-        _Pragma("GCC ivdep") for (std::ptrdiff_t z = block; z < block + lanes; ++z)
+/// One vector. `ivdep` is true: the arrays written to are read at the same place only.
+#define VDBGEO_LANES(z, block) _Pragma("GCC ivdep") for (std::ptrdiff_t z = block; z < block + lanes; ++z)
+#define VDBGEO_FOR_LANES(z, z0, z1) \
+    for (std::ptrdiff_t block = z0; block < z1; block += lanes) VDBGEO_LANES(z, block)
 
-/// Coefficient of the face between two voxels, twice: 0 where one is not active.
-inline float face(float a, float b) {
-    const float sum = a + b;
-    return sum > 0.0f ? sum : 0.0f;
+/// The same statement for vectors with all faces open (`solid` is true in it) and for the others.
+#define VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1, ...)                     \
+    const Open open = open_part(range, y);                                     \
+    for (std::ptrdiff_t block = z0; block < z1; block += lanes) {               \
+        if (block >= open.begin && block + lanes <= open.end) {                 \
+            constexpr bool solid = true;                                        \
+            VDBGEO_LANES(z, block) __VA_ARGS__;                                 \
+        } else {                                                                \
+            constexpr bool solid = false;                                       \
+            VDBGEO_LANES(z, block) __VA_ARGS__;                                 \
+        }                                                                       \
+    }
+
+/// Where all faces of a row's voxels are open.
+struct Open {
+    int begin, end;
+};
+inline void cut(Open& open, const RowSpan& row, int margin) {
+    if (!row.solid) open.end = 0;
+    if (row.begin + margin > open.begin) open.begin = row.begin + margin;
+    if (row.end - margin < open.end) open.end = row.end - margin;
+}
+inline Open open_part(const PlaneRange& range, int y) {
+    Open open{0, 1 << 20};
+    // A row that reaches to the end of its memory has its neighbours along z in the halo, which no one needs.
+    cut(open, range.spans[y], range.spans[y].end - range.spans[y].begin == range.stride ? 0 : 1);
+    if (open.end <= open.begin) return open;
+    cut(open, range.spans[y - 1], 0);
+    cut(open, range.spans[y + 1], 0);
+    cut(open, range.before[y], 0);
+    cut(open, range.after[y], 0);
+    return open;
 }
 
-inline float if_active(float d, float difference) { return d >= 0.0f ? difference : 0.0f; }
+/// Coefficient of the face between two voxels, twice: 0 where one is not active.
+template <bool solid>
+inline float face(float a, float b) {
+    const float sum = a + b;
+    return solid || sum > 0.0f ? sum : 0.0f;
+}
 
-void laplacian(const PlaneRange& range, const Planes& u, const Planes& d, const float weight[3], float* result) {
+template <bool solid>
+inline float if_active(float d, float difference) {
+    return solid || d >= 0.0f ? difference : 0.0f;
+}
+
+/// L u of the voxel at offset o.
+template <bool solid>
+inline float laplacian_at(const Planes& u, const Planes& d, std::ptrdiff_t o, std::ptrdiff_t stride, float wx,
+                          float wy, float wz) {
+    const float *const c = u.here, *const m = d.here;
+    const float v = c[o];
+    const float x =
+        if_active<solid>(d.before[o], v - u.before[o]) + if_active<solid>(d.after[o], v - u.after[o]);
+    const float y = if_active<solid>(m[o - stride], v - c[o - stride]) +
+                    if_active<solid>(m[o + stride], v - c[o + stride]);
+    const float z = if_active<solid>(m[o - 1], v - c[o - 1]) + if_active<solid>(m[o + 1], v - c[o + 1]);
+    return if_active<solid>(m[o], (wx * x + wy * y) + wz * z);
+}
+
+void laplacian(const PlaneRange& range, const Planes& u_in, const Planes& d_in, const float weight[3],
+               float* result) {
+    const Planes u = u_in, d = d_in;
     const float wx = weight[0], wy = weight[1], wz = weight[2];
+    const std::ptrdiff_t stride = range.stride;
     VDBGEO_FOR_ROWS(range, y, z0, z1) {
-        const std::ptrdiff_t o = y * range.stride, up = o + range.stride, down = o - range.stride;
-        const float* const c = u.here;
-        const float* const m = d.here;
-        float* __restrict const out = result;
-        VDBGEO_FOR_LANES(z, z0, z1) {
-            const float v = c[o + z];
-            const float x = if_active(d.before[o + z], v - u.before[o + z]) +
-                            if_active(d.after[o + z], v - u.after[o + z]);
-            const float yy = if_active(m[down + z], v - c[down + z]) + if_active(m[up + z], v - c[up + z]);
-            const float zz = if_active(m[o + z - 1], v - c[o + z - 1]) +
-                             if_active(m[o + z + 1], v - c[o + z + 1]);
-            out[o + z] = if_active(m[o + z], (wx * x + wy * yy) + wz * zz);
-        }
+        const std::ptrdiff_t o = y * stride;
+        float* __restrict const out = result + o;
+        VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1,
+                                  out[z] = laplacian_at<solid>(u, d, o + z, stride, wx, wy, wz))
     }
 }
 
 /// The sum of a voxel's fluxes, weighted by axis. o: offset of the voxel.
+template <bool solid>
 inline float flux_at(const Planes& w, const Planes& d, std::ptrdiff_t o, std::ptrdiff_t stride, float wx, float wy,
                      float wz) {
-    const float v = w.here[o], e = d.here[o];
-    const float x = face(e, d.before[o]) * (w.before[o] - v) + face(e, d.after[o]) * (w.after[o] - v);
-    const float y = face(e, d.here[o - stride]) * (w.here[o - stride] - v) +
-                    face(e, d.here[o + stride]) * (w.here[o + stride] - v);
-    const float z = face(e, d.here[o - 1]) * (w.here[o - 1] - v) + face(e, d.here[o + 1]) * (w.here[o + 1] - v);
+    const float *const c = w.here, *const m = d.here;
+    const float v = c[o], e = m[o];
+    const float x = face<solid>(e, d.before[o]) * (w.before[o] - v) + face<solid>(e, d.after[o]) * (w.after[o] - v);
+    const float y = face<solid>(e, m[o - stride]) * (c[o - stride] - v) +
+                    face<solid>(e, m[o + stride]) * (c[o + stride] - v);
+    const float z = face<solid>(e, m[o - 1]) * (c[o - 1] - v) + face<solid>(e, m[o + 1]) * (c[o + 1] - v);
     return (wx * x + wy * y) + wz * z;
 }
 
@@ -65,17 +113,18 @@ void flux(const PlaneRange& range, const Planes& w_in, const Planes& d_in, const
         float* __restrict const out = result + y * stride;
         const std::ptrdiff_t o = y * stride;
         if (add) {
-            VDBGEO_FOR_LANES(z, z0, z1) out[z] += flux_at(w, d, o + z, stride, wx, wy, wz);
+            VDBGEO_FOR_LANES(z, z0, z1) out[z] += flux_at<false>(w, d, o + z, stride, wx, wy, wz);
         } else {
-            VDBGEO_FOR_LANES(z, z0, z1) out[z] = flux_at(w, d, o + z, stride, wx, wy, wz);
+            VDBGEO_FOR_LANES(z, z0, z1) out[z] = flux_at<false>(w, d, o + z, stride, wx, wy, wz);
         }
     }
 }
 
 /// here − next is 0 where nothing changes, so constant regions stay what they are to the last bit.
-#define VDBGEO_STEP(extra)                                                                                 \
-    VDBGEO_FOR_LANES(z, z0, z1)                                                                            \
-        next[z] += a * (here[z] - next[z]) + (flux_at(w, d, o + z, stride, wx, wy, wz) extra);
+#define VDBGEO_STEP(extra)                                       \
+    VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1,               \
+                              next[z] += a * (here[z] - next[z]) + \
+                                         (flux_at<solid>(w, d, o + z, stride, wx, wy, wz) extra))
 
 void step(const PlaneRange& range, const StepPlane& s) {
     const Planes w = s.w, d = s.d;

@@ -119,21 +119,22 @@ void TileGather::activity(float on, float off, float* plane) const {
 
 void TileGather::spans(RowSpan* spans) const {
     const auto all = static_cast<std::int16_t>(BlockLayout::size_z + 2 * lead_of(halo_));
-    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = all_full_ ? RowSpan{0, all} : RowSpan{all, 0};
+    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = all_full_ ? RowSpan{0, all, true} : RowSpan{all, 0, true};
     if (all_full_) return;
+    int active[BlockLayout::size_y + 2 * BlockLayout::max_halo] = {};
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
         if (brick == BlockLayout::none) return;
         const std::uint64_t word = layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
-        for (int r = y.from; r < y.to; ++r) {
+        for (int r = y.from, at = y.at; r < y.to; ++r, ++at) {
             const unsigned bits = static_cast<unsigned>(word >> (r * dim)) & 0xff;
             if (!bits) continue;
-            RowSpan& s = spans[y.at + r - y.from];
-            const auto begin = static_cast<std::int16_t>(z.at + __builtin_ctz(bits));
-            const auto end = static_cast<std::int16_t>(z.at + 32 - __builtin_clz(bits));
-            s.begin = std::min(s.begin, begin);
-            s.end = std::max(s.end, end);
+            RowSpan& s = spans[at];
+            s.begin = std::min(s.begin, static_cast<std::int16_t>(z.at + __builtin_ctz(bits)));
+            s.end = std::max(s.end, static_cast<std::int16_t>(z.at + 32 - __builtin_clz(bits)));
+            active[at] += __builtin_popcount(bits);
         }
     });
+    for (int r = 0; r < rows_of(halo_); ++r) spans[r].solid = active[r] == spans[r].end - spans[r].begin;
 }
 
 void TileGather::scatter(const float* plane, float* bricks) const {

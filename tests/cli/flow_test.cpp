@@ -88,7 +88,7 @@ TEST_F(Flow, Errors) {
 }
 
 TEST_F(Flow, TooLittleMemoryIsFive) {
-    const std::string map = phantom("a.mrc", 136);
+    const std::string map = phantom("a.mrc", 168);
     expect_error(vdbgeo({"flow", map, at("b.vdb"), "--memory", "64M"}), 5, map + ": ", "--bin 2");
     EXPECT_EQ(listing().size(), 1u);
 }

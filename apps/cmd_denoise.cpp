@@ -49,7 +49,7 @@ void DenoiseOptions::finish(Session& session) {
     files.finish();
     check_flags();
     check_map_output(files.out, session);
-    check_usage(BilateralOptions{blur, range.value_or(1)});
+    if (method == "bilateral") check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
         if (!diffusion.orders.empty())
             throw UsageError("--method perona-malik is --order 0: give one of them");
@@ -203,6 +203,7 @@ Command denoise_command() {
             o->for_blur = {app.add_option("--blur", o->blur,
                                           "Standard deviation of the gaussian and the bilateral filter in "
                                           "voxels, to 10.5")
+                               ->check(CLI::Range(0.0, 10.5).description(""))
                                ->capture_default_str()};
             o->for_range = {app.add_option("--range", o->range,
                                            "Difference in density, in the map's units, that the bilateral "

@@ -126,7 +126,7 @@ void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session)
 
 void run_flow(const FlowOptions& o, Session& session) {
     Run run;
-    MapFile in = read_for_filter(o.files, {"the flow", o.moves_surface() ? 4.2 : 28.2}, session);
+    MapFile in = read_for_filter(o.files, {"the flow", o.moves_surface() ? 4.2 : 16.2}, session);
     run.seconds["read"] = run.clock.lap();
     run.result = filter_result(o.files, in);
     if (o.moves_surface())

@@ -255,7 +255,7 @@ void FlowFlags::add(CLI::App& app) {
                    fmt::format("How long: voxels^(2q+2) of a density [{}]; of a surface voxels^2 under mean "
                                "curvature, else voxels^4 [{}]",
                                density.time, surface.time));
-    app.add_option("--dt", dt, "Step in time; at most the bound for stability [0.9 of it]");
+    app.add_option("--dt", dt, "Longest step in time; at most the bound for stability [chosen by the flow]");
     of_density_ = {
         app.add_option("--order", density.order,
                        "Order q of the flow of a density: 0 mean curvature, 1 surface diffusion, to 7")
@@ -269,7 +269,7 @@ void FlowFlags::add(CLI::App& app) {
             ->capture_default_str()};
     of_surface_ = {
         app.add_option("--half-width", surface.half_width,
-                       "Half the width of the band about a surface, in voxels [what the flow needs]")};
+                       "Half the width of the band that is written, in voxels, 2 to 20 [the input's, or 3]")};
 }
 
 void FlowFlags::finish() {

@@ -13,7 +13,7 @@
 namespace vdbgeo::app {
 namespace {
 
-constexpr int picture_width = 1280, gap = 16, heading = 30;
+constexpr int widest = 1280, narrowest = 760, gap = 16, heading = 30;
 constexpr double em = 17;
 const Vec3f ink = Vec3f::Constant(0.13f);
 
@@ -158,11 +158,12 @@ Image Preview::draw() const {
         across = std::max(across, sum);
     }
     const double most = rows_.size() > 2 ? 300 : 440;
-    const double scale = std::min((picture_width - 4 * gap) / across, most / tallest);
+    const double scale = std::min((widest - 4 * gap) / across, most / tallest);
     const auto pixels = [&](double length) {
         return std::max(1, static_cast<int>(std::lround(scale * length)));
     };
     const int row_height = pixels(tallest) + 2 * heading;
+    const int picture_width = std::clamp(pixels(across) + 4 * gap, narrowest, widest);
     const Image spectra = draw_spectra(picture_width - 2 * gap);
     Image image(picture_width, static_cast<int>(rows_.size()) * row_height + spectra.height + 2 * gap);
     int top = gap;

@@ -70,8 +70,13 @@ TEST_F(Edges, Errors) {
         expect_error(vdbgeo(words), 2, "");
     }
     expect_error(vdbgeo({"edges", map, at("b.mrc"), "--dt", "9", "--quiet"}), 3, map + ": ");
-    expect_error(vdbgeo({"edges", map, at("b.mrc"), "--memory", "10K", "--quiet"}), 5, map + ": ");
     EXPECT_EQ(listing(), before);
+}
+
+TEST_F(Edges, TooLittleMemoryIsFive) {
+    const std::string map = phantom("a.mrc", 136);
+    expect_error(vdbgeo({"edges", map, at("b.mrc"), "--memory", "64M"}), 5, map + ": ", "--bin 2");
+    EXPECT_EQ(listing().size(), 1u);
 }
 
 TEST_F(Edges, SameBytesForAnyNumberOfThreads) {

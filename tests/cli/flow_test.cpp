@@ -81,11 +81,16 @@ TEST_F(Flow, Errors) {
     expect_error(vdbgeo({"flow", map, at("b.vdb"), "--dt", "9", "--quiet"}), 3, map + ": ");
     expect_error(vdbgeo({"flow", map, at("b.vdb"), "--surface", "willmore", "--iso", "1e9", "--quiet"}), 5,
                  map + ": ");
-    expect_error(vdbgeo({"flow", map, at("b.vdb"), "--memory", "10K"}), 5, map + ": ");
     EXPECT_EQ(listing(), before);
-    good({"convert", map, at("s.vdb"), "--surface", "0", "--quiet"});
+    good({"convert", map, at("s.vdb"), "--grids", "surface", "--iso", "0", "--quiet"});
     expect_error(vdbgeo({"flow", at("s.vdb"), at("b.vdb"), "--grid", "surface", "--quiet"}), 3,
                  at("s.vdb") + ": ", "level set");
+}
+
+TEST_F(Flow, TooLittleMemoryIsFive) {
+    const std::string map = phantom("a.mrc", 168);
+    expect_error(vdbgeo({"flow", map, at("b.vdb"), "--memory", "64M"}), 5, map + ": ", "--bin 2");
+    EXPECT_EQ(listing().size(), 1u);
 }
 
 TEST_F(Flow, SameBytesForAnyNumberOfThreads) {

@@ -7,7 +7,8 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info", "convert", "phantom", "surface", "measure", "render", "model"};
+const Words all_commands{"info", "convert", "phantom", "denoise", "edges", "transform",
+                         "flow", "surface", "measure", "render",  "model"};
 
 struct Promise {
     const char* command;
@@ -19,6 +20,13 @@ const std::vector<Promise> promises{
     {"convert", {"Voxel size in Å", "in the map's units", "sigma", "0, 1, 2, 6, 12 or 101", "[blosc]"}},
     {"phantom",
      {"--size INT=128", "Voxel size in Å", "Radius in Å", "Height in Å", "Period in Å", "[no noise]"}},
+    {"denoise",
+     {"--method TEXT=hyperdiffusion", "voxels^(2q+2)", "in the map's units a voxel", "[auto]", "--memory",
+      "--preview", "[0.9 of it]"}},
+    {"edges", {"--order INT=0", "--time FLOAT=10", "voxels^(2q+2)", "--preview"}},
+    {"transform",
+     {"--orders", "--times", "in voxels^(2q+2)", "[inf]", "--keep", "--band-pass", "OUT_mode_1.mrc"}},
+    {"flow", {"--surface", "voxels^2", "--iso TEXT=auto", "signed distances in Å", "--density-scale"}},
     {"surface", {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
@@ -100,6 +108,8 @@ TEST_F(Help, ExamplesRun) {
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
         }
     }
-    for (const char* made : {"emd_1080.vdb", "atpase.mrc", "clean.mrc", "groel.png", "groel/surface.ply"})
+    for (const char* made : {"emd_1080.vdb", "smooth.mrc", "smooth.png", "median.mrc", "edges.mrc",
+                             "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc", "flowed.mrc", "smooth.vdb",
+                             "atpase.mrc", "clean.mrc", "groel.png", "groel/surface.ply"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -128,8 +128,13 @@ TEST_F(Transform, Errors) {
     }
     expect_error(vdbgeo({"transform", map, at("t.vdb"), "--format", "mrc"}), 2, at("t.vdb") + ": ");
     expect_error(vdbgeo({"transform", map, "-"}), 2, "-: ");
-    expect_error(vdbgeo({"transform", map, at("t"), "--memory", "10K"}), 5, map + ": ");
     EXPECT_EQ(listing(), before);
+}
+
+TEST_F(Transform, TooLittleMemoryIsFive) {
+    const std::string map = phantom("a.mrc", 136);
+    expect_error(vdbgeo({"transform", map, at("t"), "--memory", "64M"}), 5, map + ": ", "--bin 2");
+    EXPECT_EQ(listing().size(), 1u);
 }
 
 TEST_F(Transform, SameBytesForAnyNumberOfThreads) {

@@ -72,13 +72,27 @@ void draw_segments(Image& image, const std::vector<Segment>& segments, double th
     const double half = thickness / 2, reach = half + 1;
     const auto [left, right] = touched(low.x() - reach, high.x() + reach, image.width);
     const auto [top, bottom] = touched(low.y() - reach, high.y() + reach, image.height);
+    if (left >= right || top >= bottom) return;
+    // Each segment looks only at the pixels that it reaches.
+    const auto width = static_cast<std::size_t>(right - left);
+    std::vector<double> nearest(width * static_cast<std::size_t>(bottom - top), reach);
+    for (const Segment& s : segments) {
+        const Vec2d lower = s.from.cwiseMin(s.to), upper = s.from.cwiseMax(s.to);
+        const auto [x0, x1] = touched(lower.x() - reach, upper.x() + reach, image.width);
+        const auto [y0, y1] = touched(lower.y() - reach, upper.y() + reach, image.height);
+        for (int y = y0; y < y1; ++y)
+            for (int x = x0; x < x1; ++x) {
+                double& d =
+                    nearest[static_cast<std::size_t>(y - top) * width + static_cast<std::size_t>(x - left)];
+                d = std::min(d, distance_to(s, Vec2d(x + 0.5, y + 0.5)));
+            }
+    }
     for (int y = top; y < bottom; ++y)
         for (int x = left; x < right; ++x) {
-            double nearest = reach;
-            for (const Segment& s : segments)
-                nearest = std::min(nearest, distance_to(s, Vec2d(x + 0.5, y + 0.5)));
+            const double d =
+                nearest[static_cast<std::size_t>(y - top) * width + static_cast<std::size_t>(x - left)];
             // A line thinner than a pixel is a pixel wide and fainter.
-            const double cover = std::clamp(std::max(half, 0.5) - nearest + 0.5, 0.0, 1.0);
+            const double cover = std::clamp(std::max(half, 0.5) - d + 0.5, 0.0, 1.0);
             blend(image, x, y, colour, cover * std::min(1.0, thickness));
         }
 }

@@ -127,14 +127,18 @@ Ticks linear_axis(Frame2d& frame, const Extent& e, double em) {
 void draw_curve(Image& image, const Frame2d& frame, const Curve& curve, bool logarithmic, double em) {
     std::vector<Segment> segments;
     std::optional<Vec2d> last;
+    bool last_below = false;  // the lowest value that the axis shows
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
         std::optional<Vec2d> here;
+        bool below = false;
         if (drawn(curve.y[i], logarithmic)) {
             const double y = logarithmic ? std::log10(curve.y[i]) : curve.y[i];
+            below = y < frame.y_low;
             here = Vec2d(frame.x(curve.x[i]), frame.y(std::max(y, frame.y_low)));
         }
-        if (here && last) segments.push_back({*last, *here});
+        if (here && last && !(below && last_below)) segments.push_back({*last, *here});
         last = here;
+        last_below = below;
     }
     draw_segments(image, segments, std::max(1.5, 0.14 * em), curve.colour);
 }

@@ -27,6 +27,8 @@ auto naming(const std::string& name, const Body& body) -> decltype(body()) {
         return body();
     } catch (const InvalidInput& e) {
         throw InvalidInput(name + ": " + e.what());
+    } catch (const NumericalError& e) {
+        throw NumericalError(name + ": " + e.what());
     }
 }
 

@@ -64,18 +64,21 @@ TEST_F(Transform, SomeModesAreOneMap) {
     EXPECT_LT(largest_difference(samples("d.mrc"), samples("a.mrc")), 1e-5);
 }
 
-// A band from time LOW to time HIGH is what a low-pass up to LOW leaves less what one up to HIGH leaves.
+// A band from time LOW to HIGH: what is left after LOW, less what is left when that goes on to HIGH.
 TEST_F(Transform, ABandByOrderAndTime) {
     const std::string map = noisy("a.mrc", 24);
     good({"transform", map, at("b.mrc"), "--band-pass", "0.5:4", "--orders", "0", "--quiet"});
-    for (const char* time : {"0.5", "4"})
-        good({"denoise", map, at(std::string("low") + time + ".mrc"), "--order", "0", "--sigma", "inf",
-              "--time", time, "--stepper", "euler", "--dt", "0.02", "--quiet"});
-    auto band = samples("low0.5.mrc");
-    const auto low = samples("low4.mrc");
-    for (std::size_t i = 0; i < band.size(); ++i) band[i] -= low[i];
+    const auto low_pass = [&](const std::string& in, const std::string& out, const char* time) {
+        good({"denoise", in, at(out), "--order", "0", "--sigma", "inf", "--time", time, "--quiet"});
+    };
+    low_pass(map, "low.mrc", "0.5");
+    low_pass(at("low.mrc"), "high.mrc", "3.5");
+    auto band = samples("low.mrc");
+    const auto high = samples("high.mrc");
+    for (std::size_t i = 0; i < band.size(); ++i) band[i] -= high[i];
     const double size = rms_of_difference(band, std::vector<float>(band.size()));
-    EXPECT_LT(rms_of_difference(samples("b.mrc"), band), 0.05 * size);  // two steppers
+    EXPECT_GT(size, 0.01);
+    EXPECT_LT(largest_difference(samples("b.mrc"), band), 1e-4 * size);
 }
 
 TEST_F(Transform, FormatsByEndingFlagAndInput) {
@@ -106,7 +109,6 @@ TEST_F(Transform, Errors) {
     for (const Words& flags : std::vector<Words>{{"--orders", "1,2"},
                                                  {"--orders", "99"},
                                                  {"--times", "-1"},
-                                                 {"--times", ""},
                                                  {"--times", "1,x"},
                                                  {"--orders", "1,2", "--times", "1,2,3"},
                                                  {"--keep", "0"},

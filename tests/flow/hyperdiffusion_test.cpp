@@ -500,7 +500,7 @@ TEST(Hyperdiffusion, RefusesBadOptions) {
         o.steps = -1;
     });
     for (const double dt : {0.0, -1.0, nan, infinity}) refused([dt](O& o) { o.dt = dt; });
-    for (const int n : {0, -3, 201}) refused([n](O& o) { o.cycle = n; });
+    for (const int n : {0, -3, 301}) refused([n](O& o) { o.cycle = n; });
     refused([](O& o) { o.min_cycles = 0; });
     for (const double b : {-1.0, nan, infinity}) refused([b](O& o) { o.fidelity = b; });
     for (const int r : {0, 9, -1}) refused([r](O& o) { o.sigma.radius = r; });

@@ -1,3 +1,4 @@
+#include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/pde_transform.h"
 
 #include <gtest/gtest.h>
@@ -95,13 +96,16 @@ TEST(PdeTransform, WavesGoFromFineToCoarse) {
     std::vector<double> left(box.modes.size(), 1.0);
     for (std::size_t k = 0; k < o.passes.size(); ++k) {
         std::vector<double> amplitudes;
-        const HyperdiffusionReport& report = m.reports[k];
+        const double bound = 2 / std::pow(12.0, o.passes[k].order + 1);
+        const std::vector<CycleRun> cycles =
+            cycles_for_time(Stepper::fsi, o.passes[k].time, 0.9 * bound, {o.passes[k].order, {}, 3});
         for (std::size_t i = 0; i < left.size(); ++i) {
             const double rate = std::pow(box.modes[i].eigenvalue(), o.passes[k].order + 1);
             test::State s{{left[i]}};
-            for (int c = 0; c < report.cycles; ++c)
-                s = test::fsi_cycle(s, report.steps / report.cycles, report.dt,
-                                    [&](const test::State& u) { return test::State{{-rate * u[0][0]}}; });
+            for (const CycleRun& run : cycles)
+                for (int c = 0; c < run.cycles; ++c)
+                    s = test::fsi_cycle(s, run.n, run.tau,
+                                        [&](const test::State& u) { return test::State{{-rate * u[0][0]}}; });
             amplitudes.push_back(left[i] - s[0][0]);
             left[i] = s[0][0];
         }

@@ -53,7 +53,8 @@ class UntilNoiseIsGone {
             if (k > 0) n = std::min(options_.cycle.value_or(300), growing_cycle(highest_order(options_), k));
             take({1, n, largest_}, report, progress);
             const double now = solver_.removed();
-            if (now >= noise_) {
+            // The first cycle turns the finest noise over a little: that it removes more than there is says nothing.
+            if (now >= noise_ * (k == 0 ? 1 + turned : 1)) {
                 if (now > (1 + tolerance) * noise_) go_back(time, removed, now, report, progress);
                 return;
             }
@@ -64,7 +65,7 @@ class UntilNoiseIsGone {
 
  private:
     static constexpr int most_steps = 300;
-    static constexpr double tolerance = 0.01;
+    static constexpr double tolerance = 0.01, turned = 0.1;
 
     void take(const CycleRun& cycle, HyperdiffusionReport& report, const Progress& progress) {
         cycles_.push_back(cycle);

@@ -193,6 +193,7 @@ void Sweep::run(BlockLayout::Run cells, Scratch& s) const {
         for (int k = 0; k < static_cast<int>(plan_.steps.size()); ++k) advance(k, x - k * (top_ + 1), first, s);
         if (x - halo_ >= in.x_begin()) scatter(out, x - halo_, s);
     }
+    kernels_.finish_writing();
 }
 
 }  // namespace

@@ -56,6 +56,12 @@ struct Kernels {
     /// out = Σ_a weight_a Σ max(0, d_i + d_n)(w_n − w_i), added to what is there or not.
     void (*flux)(const PlaneRange&, const Planes& w, const Planes& d, const float weight[3], bool add, float* out);
     void (*step)(const PlaneRange&, const StepPlane&);
+    /// Copies rows of 8 floats; `from` has them one behind the other, `to` has them `stride` apart.
+    void (*spread)(const float* from, int rows, float* to, std::ptrdiff_t stride);
+    /// The reverse for 8 rows, past the caches where the CPU can: `to` is on a cache line.
+    void (*collect)(const float* from, std::ptrdiff_t stride, float* to);
+    /// After the last `collect` of a thread's task: other threads see it from then on.
+    void (*finish_writing)();
     /// Central differences times scale[a] in the rows of a plane, a missing neighbour having the voxel's own
     /// value; 0 in voxels that are not active. g: the components, or null; square: the sum of their squares.
     void (*gradient)(const PlaneRange&, const Planes& u, const Planes& active, const float scale[3],

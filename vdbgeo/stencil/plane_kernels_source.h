@@ -1,6 +1,10 @@
 // The loops themselves. Included by one source file for each kind of CPU, compiled for it, with
 // VDBGEO_KERNELS the name of the set. Nothing here may instantiate a template or an inline function from
 // elsewhere: the linker would keep one copy of it, perhaps the one for the newest CPU.
+#if defined(__SSE__)
+#include <immintrin.h>
+#endif
+
 #include "vdbgeo/stencil/plane_kernels.h"
 
 namespace vdbgeo::stencil {
@@ -147,6 +151,40 @@ void step(const PlaneRange& range, const StepPlane& s) {
     }
 }
 
+/// A row of a leaf.
+struct Row {
+    float values[8];
+};
+
+void spread(const float* from, int rows, float* to, std::ptrdiff_t stride) {
+    for (int r = 0; r < rows; ++r, from += 8, to += stride) __builtin_memcpy(to, from, sizeof(Row));
+}
+
+void collect(const float* from, std::ptrdiff_t stride, float* to) {
+#if defined(__AVX512F__)
+    for (int r = 0; r < 8; r += 2, from += 2 * stride, to += 16)
+        _mm512_stream_ps(to, _mm512_castpd_ps(_mm512_insertf64x4(
+                                 _mm512_castps_pd(_mm512_castps256_ps512(_mm256_loadu_ps(from))),
+                                 _mm256_castps_pd(_mm256_loadu_ps(from + stride)), 1)));
+#elif defined(__AVX__)
+    for (int r = 0; r < 8; ++r, from += stride, to += 8) _mm256_stream_ps(to, _mm256_loadu_ps(from));
+#elif defined(__SSE__)
+    for (int r = 0; r < 8; ++r, from += stride, to += 8) {
+        _mm_stream_ps(to, _mm_loadu_ps(from));
+        _mm_stream_ps(to + 4, _mm_loadu_ps(from + 4));
+    }
+#else
+    for (int r = 0; r < 8; ++r, from += stride, to += 8) __builtin_memcpy(to, from, sizeof(Row));
+#endif
+}
+
+/// Orders what `collect` wrote before what other threads read after a lock.
+void finish_writing() {
+#if defined(__SSE__)
+    _mm_sfence();
+#endif
+}
+
 /// e^x for −40 ≤ x ≤ 0, smaller x as −40: relative error below 3e-7. 2^n · 2^f with |f| ≤ ½, 2^f by its
 /// Taylor series to the sixth power.
 inline float exponential(float x) {
@@ -262,7 +300,7 @@ void variance(std::size_t n, const double* __restrict count, const double* __res
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, gradient,
+const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, spread, collect, finish_writing, gradient,
                                 window_sum, sum_rows, variance, edge_stopping};
 
 }  // namespace vdbgeo::stencil

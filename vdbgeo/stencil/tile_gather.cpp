@@ -1,7 +1,6 @@
 #include "vdbgeo/stencil/tile_gather.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "vdbgeo/stencil/block_field.h"
 
@@ -12,8 +11,6 @@ constexpr int dim = 8;
 
 /// Rounds to minus infinity.
 constexpr int floor_div(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
-
-void copy_row(const float* from, float* to) { std::memcpy(to, from, dim * sizeof(float)); }
 
 }  // namespace
 
@@ -27,7 +24,7 @@ int TileGather::parts(int leaves, int halo, Part* out) {
 }
 
 TileGather::TileGather(const BlockLayout& layout, BlockLayout::Run run, int halo)
-    : layout_(layout), run_(run), halo_(halo), stride_(stride_of(halo)) {
+    : layout_(layout), run_(run), halo_(halo), stride_(stride_of(halo)), kernels_(kernels()) {
     const auto& first = layout.cells()[static_cast<std::size_t>(run.first)];
     origin_ = first.origin;
     x_begin_ = origin_.x();
@@ -67,11 +64,13 @@ void TileGather::move_to(int x) {
     find_bricks(layer + 1, next_bricks_);
     layer_ = layer;
     leaves_here_ = 0;
-    all_full_ = true;
+    regular_ = true;
     for (int i = 0; i < count; ++i) {
-        leaves_here_ += bricks_[i] != BlockLayout::none;
-        all_full_ = all_full_ && bricks_[i] != BlockLayout::none && layout_.full(static_cast<std::size_t>(bricks_[i]));
+        if (bricks_[i] == BlockLayout::none) continue;
+        ++leaves_here_;
+        regular_ = regular_ && layout_.full(static_cast<std::size_t>(bricks_[i]));
     }
+    if (regular_) find_spans(regular_spans_.data());
 }
 
 template <class Body>
@@ -97,9 +96,9 @@ void TileGather::copy(const float* bricks, float absent, float* plane) const {
             for (int r = y.from; r < y.to; ++r, to += stride_) std::fill_n(to, dim, absent);
             return;
         }
-        const float* from =
-            bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + (in_leaf * dim + y.from) * dim;
-        for (int r = y.from; r < y.to; ++r, to += stride_, from += dim) copy_row(from, to);
+        kernels_.spread(
+            bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + (in_leaf * dim + y.from) * dim,
+            y.to - y.from, to, stride_);
     });
 }
 
@@ -118,9 +117,15 @@ void TileGather::activity(float on, float off, float* plane) const {
 }
 
 void TileGather::spans(RowSpan* spans) const {
+    if (regular_)
+        std::copy_n(regular_spans_.data(), rows_of(halo_), spans);
+    else
+        find_spans(spans);
+}
+
+void TileGather::find_spans(RowSpan* spans) const {
     const auto all = static_cast<std::int16_t>(BlockLayout::size_z + 2 * lead_of(halo_));
-    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = all_full_ ? RowSpan{0, all, true} : RowSpan{all, 0, true};
-    if (all_full_) return;
+    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = {all, 0, true};
     int active[BlockLayout::size_y + 2 * BlockLayout::max_halo] = {};
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
         if (brick == BlockLayout::none) return;
@@ -131,7 +136,7 @@ void TileGather::spans(RowSpan* spans) const {
             RowSpan& s = spans[at];
             s.begin = std::min(s.begin, static_cast<std::int16_t>(z.at + __builtin_ctz(bits)));
             s.end = std::max(s.end, static_cast<std::int16_t>(z.at + 32 - __builtin_clz(bits)));
-            active[at] += __builtin_popcount(bits);
+            active[at] += static_cast<int>((bits * 0x200040008001ULL & 0x111111111111111ULL) % 15);
         }
     });
     for (int r = 0; r < rows_of(halo_); ++r) spans[r].solid = active[r] == spans[r].end - spans[r].begin;
@@ -142,9 +147,8 @@ void TileGather::scatter(const float* plane, float* bricks) const {
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
         if (brick == BlockLayout::none) return;
         if (y.leaf < 0 || y.leaf >= BlockLayout::leaves_y || z.leaf < 0 || z.leaf >= BlockLayout::leaves_z) return;
-        const float* from = plane + y.at * stride_ + z.at;
-        float* to = bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + in_leaf;
-        for (int r = 0; r < dim; ++r, from += stride_, to += dim) copy_row(from, to);
+        kernels_.collect(plane + y.at * stride_ + z.at, stride_,
+                         bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + in_leaf);
     });
 }
 

@@ -1,6 +1,7 @@
 // Planes of a tile, with a halo, from bricks and back.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -35,7 +36,7 @@ class TileGather {
     void activity(float on, float off, float* plane) const;
     /// The active part of each row.
     void spans(RowSpan* rows) const;
-    /// Writes the plane, without its halo, into the bricks of the run.
+    /// Writes the plane, without its halo, into the bricks of the run. End with Kernels::finish_writing.
     void scatter(const float* plane, float* bricks) const;
 
  private:
@@ -44,6 +45,7 @@ class TileGather {
         int leaf, from, to, at;     // leaf number from the cell's first; voxels [from, to) of it; place in the plane
     };
     static int parts(int leaves, int halo, Part* out);
+    void find_spans(RowSpan* rows) const;
     void find_bricks(int layer, std::int32_t* out) const;
     template <class Body>
     void for_leaves(const Body& body) const;
@@ -55,7 +57,10 @@ class TileGather {
     openvdb::Coord origin_;
     Part y_[BlockLayout::leaves_y + 2 * most], z_[BlockLayout::leaves_z + 2 * most];
     int y_count_, z_count_, leaves_here_ = 0;
-    bool all_full_ = false;
+    /// Every leaf of the layer is full or missing: its planes have the same spans.
+    bool regular_ = false;
+    std::array<RowSpan, BlockLayout::size_y + 2 * BlockLayout::max_halo> regular_spans_;
+    const Kernels& kernels_;
     using Bricks = std::int32_t[(BlockLayout::leaves_y + 2 * most) * (BlockLayout::leaves_z + 2 * most)];
     Bricks bricks_, next_bricks_;  // of this layer of leaves along x, and of the one after it
 };

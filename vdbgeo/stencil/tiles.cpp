@@ -80,6 +80,7 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
         gather.move_to(t.origin.x() + x);
         for (std::size_t i = 0; i < f.out.size(); ++i) gather.scatter(t.out[i] + x * s.plane - corner, f.out[i]);
     }
+    kernels().finish_writing();
 }
 
 }  // namespace

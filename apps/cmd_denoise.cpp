@@ -180,6 +180,9 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     }
     j["seconds"] = seconds;
     say_outcome(outcome, j, rms_before, session);
+    if (j["automatic"] == true && outcome.removed == 0)
+        session.warn(o.files.in +
+                     ": no noise was found, and nothing was changed; --time tells how long to diffuse");
     session.result(j);
 }
 

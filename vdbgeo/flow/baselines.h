@@ -15,8 +15,8 @@ namespace vdbgeo {
 /// 0 gives the input back), cut at the cube of ⌈3 sigma⌉ voxels: three passes, one an axis.
 void gaussian_filter(openvdb::FloatGrid& grid, double sigma, const Progress& progress = {});
 
-/// Median over the active voxels of the (2r+1)³ window, r 1…8 (0 gives the input back); of an even number, the
-/// mean of the middle two. Cost: by the (2r+1)² voxels that a window's next step takes in.
+/// Median over the active voxels of the (2r+1)³ window, r 1…8 (0 gives the input back); of an even number,
+/// the mean of the middle two. Cost: by the (2r+1)² voxels that a window's next step takes in.
 void median_filter(openvdb::FloatGrid& grid, int radius, const Progress& progress = {});
 
 struct BilateralOptions {
@@ -25,7 +25,9 @@ struct BilateralOptions {
     void check() const;
 };
 
-/// Σ g_s(|x − y|) g_r(u_x − u_y) u_y / Σ g_s g_r over the active voxels within 2 sigma (Tomasi & Manduchi 1998).
-void bilateral_filter(openvdb::FloatGrid& grid, const BilateralOptions& options, const Progress& progress = {});
+/// Σ g_s(|x − y|) g_r(u_x − u_y) u_y / Σ g_s g_r over the active voxels within 2 sigma (Tomasi & Manduchi
+/// 1998).
+void bilateral_filter(openvdb::FloatGrid& grid, const BilateralOptions& options,
+                      const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -37,8 +37,9 @@ HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassO
                             {{{options.order, options.fast}}, options.coupling_v}},
                            options.sigma);
     const double step = solver.step(options.stepper, options.dt);
-    solver.run(options.stepper, cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}), report,
-               progress);
+    solver.run(options.stepper,
+               cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),
+               report, progress);
     solver.describe(report);
     solver.store(grid);
     return report;

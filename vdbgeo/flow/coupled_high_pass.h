@@ -6,16 +6,16 @@
 namespace vdbgeo {
 
 struct HighPassOptions {
-    int order = 0;               ///< q of both operators
-    double slow = 0;             ///< d_10 ≥ 0 of u
-    double fast = 1;             ///< d_20 ≥ d_10 of v
-    double coupling_u = 0.02;    ///< ε_u ≥ 0
-    double coupling_v = 0.02;    ///< ε_v ≥ 0
+    int order = 0;             ///< q of both operators
+    double slow = 0;           ///< d_10 ≥ 0 of u
+    double fast = 1;           ///< d_20 ≥ d_10 of v
+    double coupling_u = 0.02;  ///< ε_u ≥ 0
+    double coupling_v = 0.02;  ///< ε_v ≥ 0
     EdgeScale sigma;
-    double time = 10;            ///< ≥ 0
-    std::optional<double> dt;    ///< Euler's step; at most the bound
+    double time = 10;          ///< ≥ 0
+    std::optional<double> dt;  ///< Euler's step; at most the bound
     Stepper stepper = Stepper::fsi;
-    std::optional<int> cycle;    ///< steps in a cycle of frozen coefficients, 1…300; unset: they grow
+    std::optional<int> cycle;  ///< steps in a cycle of frozen coefficients, 1…300; unset: they grow
 
     void check() const;
 };

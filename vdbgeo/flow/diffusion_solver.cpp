@@ -54,7 +54,8 @@ std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double large
         const int n = stepper == Stepper::fsi ? *rule.longest : 1;
         const double cycles = std::ceil(time / cycle_time(stepper, n, largest) * whole);
         if (cycles > 1e9)
-            throw InvalidInput(fmt::format("time {:g} takes {:.3g} cycles of steps of {:g}", time, cycles, largest));
+            throw InvalidInput(
+                fmt::format("time {:g} takes {:.3g} cycles of steps of {:g}", time, cycles, largest));
         const int least = stepper == Stepper::fsi ? rule.least : 1;
         return {equal_cycles(stepper, std::max(least, static_cast<int>(cycles)), time, largest)};
     }
@@ -64,15 +65,21 @@ std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double large
         growing.push_back({1, growing_cycle(rule.order, static_cast<int>(growing.size())), 0});
         all += cycle_time(stepper, growing.back().n, largest);
         if (growing.size() > 1000000)
-            throw InvalidInput(fmt::format("time {:g} takes more than a million cycles of steps of {:g}", time, largest));
+            throw InvalidInput(
+                fmt::format("time {:g} takes more than a million cycles of steps of {:g}", time, largest));
     }
-    if (static_cast<int>(growing.size()) <= rule.least) return {equal_cycles(stepper, rule.least, time, largest)};
+    if (static_cast<int>(growing.size()) <= rule.least)
+        return {equal_cycles(stepper, rule.least, time, largest)};
     for (CycleRun& r : growing) r.tau = largest * (time / all);
     return growing;
 }
 
-DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma)
-    : grid_(grid), layout_(grid.tree()), fields_(std::move(fields)), sigma_(sigma),
+DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields,
+                                 const EdgeScale& sigma)
+    : grid_(grid),
+      layout_(grid.tree()),
+      fields_(std::move(fields)),
+      sigma_(sigma),
       weights_(axis_weights(grid.transform())) {
     for (Field& f : fields_) {
         f.terms.erase(std::remove_if(f.terms.begin(), f.terms.end(),
@@ -84,14 +91,16 @@ DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Fie
         State s{stencil::ShiftedField(layout_), stencil::ShiftedField(layout_), {}};
         if (!constant_coefficients())
             for (const DiffusionTerm& t : f.terms)
-                s.diffusivities.push_back(t.diffusivity > 0 ? BlockField(layout_.brick_count()) : BlockField());
+                s.diffusivities.push_back(t.diffusivity > 0 ? BlockField(layout_.brick_count())
+                                                            : BlockField());
         states_.push_back(std::move(s));
     }
     stencil::load(layout_, grid.tree(), 0, states_[0].now.now());
     const stencil::FieldSummary given = summarize(layout_, states_[0].now.now());
     if (given.non_finite)
-        throw InvalidInput(fmt::format("{} of {} values are NaN or infinite; --threshold or --mask leaves them out",
-                                       given.non_finite, given.count + given.non_finite));
+        throw InvalidInput(
+            fmt::format("{} of {} values are NaN or infinite; --threshold or --mask leaves them out",
+                        given.non_finite, given.count + given.non_finite));
     range_ = static_cast<double>(given.max) - given.min;
     offset_ = static_cast<float>(given.mean());
     for (State& s : states_) stencil::load(layout_, grid.tree(), offset_, s.now.now());
@@ -188,9 +197,9 @@ void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& 
     check();
 }
 
-/// u += Π_a (I + θ τ A_a)^{-1} τ A u, where A is the whole operator and A_a = Σ_q L_{d,a} L_a^q: first order in time
-/// for any θ. With constant coefficients (Σλ_a)^{q+1} ≤ 3^q Σ λ_a^{q+1}, so an amplitude changes by at most 3^q/θ
-/// times itself: stable for θ ≥ 3^q/2, whatever τ.
+/// u += Π_a (I + θ τ A_a)^{-1} τ A u, where A is the whole operator and A_a = Σ_q L_{d,a} L_a^q: first order
+/// in time for any θ. With constant coefficients (Σλ_a)^{q+1} ≤ 3^q Σ λ_a^{q+1}, so an amplitude changes by
+/// at most 3^q/θ times itself: stable for θ ≥ 3^q/2, whatever τ.
 void DiffusionSolver::implicit_step(double tau) {
     stencil::SweepPlan p = plan();
     p.steps = {{1.0, tau}};
@@ -294,9 +303,10 @@ void DiffusionSolver::store(openvdb::FloatGrid& grid) const {
     }
     BlockField difference(layout_.brick_count());
     const float *u = states_[0].now.now(), *v = states_[1].now.now();
-    parallel_blocks(layout_.brick_count() * BlockField::brick_size, 1 << 15, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) difference.brick(0)[i] = u[i] - v[i];
-    });
+    parallel_blocks(layout_.brick_count() * BlockField::brick_size, 1 << 15,
+                    [&](std::size_t begin, std::size_t end) {
+                        for (std::size_t i = begin; i < end; ++i) difference.brick(0)[i] = u[i] - v[i];
+                    });
     stencil::store(layout_, difference.brick(0), 0, grid.tree());
 }
 

@@ -1,5 +1,5 @@
-// What hyperdiffusion, the coupled high-pass and the PDE transform share: fields on bricks that are stepped in
-// cycles of frozen coefficients.
+// What hyperdiffusion, the coupled high-pass and the PDE transform share: fields on bricks that are stepped
+// in cycles of frozen coefficients.
 #pragma once
 
 #include <optional>
@@ -26,31 +26,32 @@ struct CycleRule {
     std::optional<int> longest;  ///< cycles of one length, of at most this many steps; unset: they grow
     int least = 1;               ///< cycles at least
 };
-/// Steps of the k-th growing cycle. The first smooths over about two voxels, so that the noise no longer hides
-/// the edges when the coefficients are next found; then there is less and less that they have to follow: the
-/// length grows by a quarter (order 0) or doubles, up to 300 steps.
+/// Steps of the k-th growing cycle. The first smooths over about two voxels, so that the noise no longer
+/// hides the edges when the coefficients are next found; then there is less and less that they have to
+/// follow: the length grows by a quarter (order 0) or doubles, up to 300 steps.
 int growing_cycle(int order, int k);
-/// The cycles that take a time with FSI, with steps of at most `largest`; for other steppers cycles of one step.
+/// The cycles that take a time with FSI, with steps of at most `largest`; for other steppers cycles of one
+/// step.
 std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double largest, const CycleRule& rule);
-/// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with two,
-/// each is drawn to the other.
+/// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with
+/// two, each is drawn to the other.
 class DiffusionSolver {
  public:
     struct Field {
         std::vector<DiffusionTerm> terms;
         double coupling = 0;  ///< β
     };
-    /// Takes X from the grid, which has leaves only (voxelized). The grid is read now and by `removed`, and has
-    /// to live as long. InvalidInput for values that are not finite.
+    /// Takes X from the grid, which has leaves only (voxelized). The grid is read now and by `removed`, and
+    /// has to live as long. InvalidInput for values that are not finite.
     DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma);
 
     /// Explicit steps are stable up to this.
     double bound() const;
-    /// The step to use: dt, or 0.9 of the bound, or for ADI, which has none, 20 times as much. InvalidInput for a
-    /// dt above the bound.
+    /// The step to use: dt, or 0.9 of the bound, or for ADI, which has none, 20 times as much. InvalidInput
+    /// for a dt above the bound.
     double step(Stepper stepper, const std::optional<double>& dt) const;
-    /// Evaluates the coefficients and takes n steps: FSI's, n times α = 1, or n semi-implicit ones. Checks that the values are finite
-    /// and that their mean stays where it was; NumericalError.
+    /// Evaluates the coefficients and takes n steps: FSI's, n times α = 1, or n semi-implicit ones. Checks
+    /// that the values are finite and that their mean stays where it was; NumericalError.
     void cycle(Stepper stepper, int n, double tau, const Progress& progress = {});
     /// Takes the cycles and adds them to the report's steps, time, cycles; its dt becomes τ.
     void run(Stepper stepper, const std::vector<CycleRun>& cycles, HyperdiffusionReport& report,
@@ -90,7 +91,8 @@ class DiffusionSolver {
     std::vector<stencil::FieldSummary> summary_;
     EdgeScale sigma_;
     Vec3d weights_;
-    float offset_ = 0;  // taken off X, so that rounding errors go with the spread of the values, not their size
+    float offset_ =
+        0;  // taken off X, so that rounding errors go with the spread of the values, not their size
     double mean_before_ = 0, range_ = 0;
 };
 

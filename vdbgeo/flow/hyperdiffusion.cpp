@@ -27,10 +27,12 @@ int highest_order(const HyperdiffusionOptions& o) {
 
 /// What the options ask for, given the largest step.
 std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
-    if (o.time) return cycles_for_time(o.stepper, *o.time, largest, {highest_order(o), o.cycle, o.min_cycles});
+    if (o.time)
+        return cycles_for_time(o.stepper, *o.time, largest, {highest_order(o), o.cycle, o.min_cycles});
     if (o.stepper != Stepper::fsi) return {{*o.steps, 1, largest}};
     std::vector<CycleRun> plan;
-    const int longest = o.cycle.value_or(20), cycles = std::max(o.min_cycles, (*o.steps + longest - 1) / longest);
+    const int longest = o.cycle.value_or(20),
+              cycles = std::max(o.min_cycles, (*o.steps + longest - 1) / longest);
     for (int c = 0, done = 0; c < cycles; ++c) {
         const int end = static_cast<int>(static_cast<std::int64_t>(*o.steps) * (c + 1) / cycles);
         if (end > done) plan.push_back({1, end - done, largest});
@@ -39,8 +41,8 @@ std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
     return plan;
 }
 
-/// Takes growing cycles until what was removed reaches the noise (discrepancy principle), or a limit of steps.
-/// Where the last cycle went beyond, all is done once more up to the time between.
+/// Takes growing cycles until what was removed reaches the noise (discrepancy principle), or a limit of
+/// steps. Where the last cycle went beyond, all is done once more up to the time between.
 class UntilNoiseIsGone {
  public:
     UntilNoiseIsGone(DiffusionSolver& solver, const HyperdiffusionOptions& o, double largest, double noise)
@@ -53,7 +55,8 @@ class UntilNoiseIsGone {
             if (k > 0) n = std::min(options_.cycle.value_or(300), growing_cycle(highest_order(options_), k));
             take({1, n, largest_}, report, progress);
             const double now = solver_.removed();
-            // The first cycle turns the finest noise over a little: that it removes more than there is says nothing.
+            // The first cycle turns the finest noise over a little: that it removes more than there is says
+            // nothing.
             if (now >= noise_ * (k == 0 ? 1 + turned : 1)) {
                 if (now > (1 + tolerance) * noise_) go_back(time, removed, now, report, progress);
                 return;
@@ -74,11 +77,13 @@ class UntilNoiseIsGone {
                                   std::min(1.0, (report.steps + cycle.n) / double(most_steps))));
     }
 
-    /// Between (time, removed) and (report.time, now) what is removed goes about with the logarithm of the time.
-    /// From nothing on, with the square root of it.
-    void go_back(double time, double removed, double now, HyperdiffusionReport& report, const Progress& progress) {
+    /// Between (time, removed) and (report.time, now) what is removed goes about with the logarithm of the
+    /// time. From nothing on, with the square root of it.
+    void go_back(double time, double removed, double now, HyperdiffusionReport& report,
+                 const Progress& progress) {
         const double share = (noise_ - removed) / (now - removed);
-        const double until = time > 0 ? time * std::pow(report.time / time, share) : report.time * share * share;
+        const double until =
+            time > 0 ? time * std::pow(report.time / time, share) : report.time * share * share;
         cycles_.pop_back();
         const std::vector<CycleRun> again = cycles_;
         const bool first = again.empty();
@@ -127,10 +132,14 @@ EdgeScale EdgeScale::parse(const std::string& text) {
 std::string EdgeScale::text() const {
     const std::string times = factor == 1 ? "" : fmt::format(" x {:g}", factor);
     switch (kind) {
-        case Kind::local: return fmt::format("local:{}", radius) + times;
-        case Kind::global: return "global" + times;
-        case Kind::infinite: return "inf";
-        default: return fmt::format("{:g}", value);
+        case Kind::local:
+            return fmt::format("local:{}", radius) + times;
+        case Kind::global:
+            return "global" + times;
+        case Kind::infinite:
+            return "inf";
+        default:
+            return fmt::format("{:g}", value);
     }
 }
 

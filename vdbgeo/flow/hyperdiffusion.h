@@ -17,9 +17,9 @@ namespace vdbgeo {
 struct EdgeScale {
     enum class Kind { local, global, value, infinite };
     Kind kind = Kind::local;
-    int radius = 2;    ///< local: variance over the (2r+1)³ window, r 1…8
-    double value = 0;  ///< value: σ itself, in density units a voxel (> 0)
-    double factor = 1; ///< multiplies the local or global σ (> 0)
+    int radius = 2;     ///< local: variance over the (2r+1)³ window, r 1…8
+    double value = 0;   ///< value: σ itself, in density units a voxel (> 0)
+    double factor = 1;  ///< multiplies the local or global σ (> 0)
 
     /// "local", "local:R", "global", "inf" or a number; InvalidInput for anything else.
     static EdgeScale parse(const std::string& text);
@@ -43,19 +43,20 @@ enum class Stepper {
 struct HyperdiffusionOptions {
     std::vector<DiffusionTerm> terms{{1, 1.0}};  ///< orders differ
     EdgeScale sigma{EdgeScale::Kind::global, 2, 0, 1};
-    /// Diffusion time, ≥ 0; 0 gives the input back. Unset, with `steps` unset too: until the root mean square of
-    /// X − u reaches the noise (noise.h), the discrepancy principle, and 300 steps or a few more at most.
+    /// Diffusion time, ≥ 0; 0 gives the input back. Unset, with `steps` unset too: until the root mean square
+    /// of X − u reaches the noise (noise.h), the discrepancy principle, and 300 steps or a few more at most.
     std::optional<double> time;
-    std::optional<int> steps;   ///< applications of the operator; with `dt`, instead of `time`
-    std::optional<double> dt;   ///< step; at most the stability bound. Unset: 0.9 of it
+    std::optional<int> steps;  ///< applications of the operator; with `dt`, instead of `time`
+    std::optional<double> dt;  ///< step; at most the stability bound. Unset: 0.9 of it
     Stepper stepper = Stepper::fsi;
-    std::optional<int> cycle;   ///< steps in a cycle of frozen coefficients, at most, 1…300; unset: they grow
-    int min_cycles = 3;         ///< cycles at least, so that σ and d follow u, and fine noise is damped well
-    double fidelity = 0;        ///< β ≥ 0 of e = β (X − u)
+    std::optional<int> cycle;  ///< steps in a cycle of frozen coefficients, at most, 1…300; unset: they grow
+    int min_cycles = 3;        ///< cycles at least, so that σ and d follow u, and fine noise is damped well
+    double fidelity = 0;       ///< β ≥ 0 of e = β (X − u)
 
     /// Throws InvalidInput for values out of range and for options that exclude each other.
     void check() const;
-    /// Σ d_q0 λ^{q+1} + β with λ = 4 Σ w_a, the largest rate of decay; explicit steps are stable up to 2 over it.
+    /// Σ d_q0 λ^{q+1} + β with λ = 4 Σ w_a, the largest rate of decay; explicit steps are stable up to 2 over
+    /// it.
     double largest_rate(const Vec3d& weights) const;
 };
 
@@ -64,23 +65,23 @@ struct HyperdiffusionReport {
     double dt = 0, time = 0;
     int steps = 0, cycles = 0;
     double mean_before = 0, mean_after = 0;
-    double noise = 0;           ///< estimated standard deviation of the noise, where it was asked for
-    double removed = 0;         ///< root mean square of X − u
-    bool automatic = false;     ///< the time was chosen here
+    double noise = 0;             ///< estimated standard deviation of the noise, where it was asked for
+    double removed = 0;           ///< root mean square of X − u
+    bool automatic = false;       ///< the time was chosen here
     std::size_t state_bytes = 0;  ///< memory of fields and tables beside the grid
 };
 
 /// w_a = (h_min / h_a)² of the axes of a grid's transform: 1 for cubic voxels.
 Vec3d axis_weights(const openvdb::math::Transform& transform);
 
-/// Solves u_t = −Σ_q L_{d_q} L^q u + β (X − u) from u = X, the grid's active values, up to the time asked for.
-/// L = −Δ_h with the band-edge rule: no flux between an active and an inactive voxel. Coefficients are
+/// Solves u_t = −Σ_q L_{d_q} L^q u + β (X − u) from u = X, the grid's active values, up to the time asked
+/// for. L = −Δ_h with the band-edge rule: no flux between an active and an inactive voxel. Coefficients are
 /// evaluated at the start of each cycle (fsi) or step (euler). Σu is kept to rounding. Without a maximum
 /// principle for q ≥ 1: values may go beyond the input's range. Inactive voxels are not touched.
 ///
-/// Throws InvalidInput for bad options, values that are not finite, a dt above the bound; NumericalError where
-/// the values or their mean diverge; Cancelled. The grid is only written to at the end.
-/// Memory: 12 to 16 bytes a voxel of active leaves for one order. Cost: docs/performance.md.
+/// Throws InvalidInput for bad options, values that are not finite, a dt above the bound; NumericalError
+/// where the values or their mean diverge; Cancelled. The grid is only written to at the end. Memory: 12 to
+/// 16 bytes a voxel of active leaves for one order. Cost: docs/performance.md.
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options = {},
                                   const Progress& progress = {});
 

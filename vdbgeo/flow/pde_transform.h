@@ -22,10 +22,11 @@ struct TransformOptions {
 };
 
 /// Receives a mode, or last the residue; the grid is handed over.
-using ModeSink = std::function<void(int index, openvdb::FloatGrid::Ptr mode, const HyperdiffusionReport& report)>;
+using ModeSink =
+    std::function<void(int index, openvdb::FloatGrid::Ptr mode, const HyperdiffusionReport& report)>;
 
-/// r_0 = X; mode_k = r_k − P_k r_k; r_{k+1} = P_k r_k. `sink` is called for each mode in order and for the last
-/// residue (index = number of passes). Their sum is X to rounding. One mode is in memory at a time.
+/// r_0 = X; mode_k = r_k − P_k r_k; r_{k+1} = P_k r_k. `sink` is called for each mode in order and for the
+/// last residue (index = number of passes). Their sum is X to rounding. One mode is in memory at a time.
 void pde_transform(const openvdb::FloatGrid& grid, const TransformOptions& options, const ModeSink& sink,
                    const Progress& progress = {});
 

@@ -17,7 +17,7 @@ using leaf::Leaf;
 using openvdb::Coord;
 
 /// Arithmetic shifts round to minus infinity: cells of negative coordinates come out right.
-constexpr int shift_x = 5, shift_y = 5, shift_z = 6;
+constexpr int shift_x = 5, shift_y = 5, shift_z = 7;
 static_assert(BlockLayout::size_x == 1 << shift_x && BlockLayout::size_z == 1 << shift_z);
 
 Coord cell_of(const Coord& o) { return {o.x() >> shift_x, o.y() >> shift_y, o.z() >> shift_z}; }
@@ -54,7 +54,8 @@ BlockLayout::BlockLayout(const openvdb::FloatTree& tree) {
     full_.resize(n);
     parallel_for(n, 512, [&](std::size_t i) {
         origins_[i] = leaves[i]->origin();
-        for (openvdb::Index w = 0; w < 8; ++w) masks_[i][w] = leaves[i]->getValueMask().getWord<std::uint64_t>(w);
+        for (openvdb::Index w = 0; w < 8; ++w)
+            masks_[i][w] = leaves[i]->getValueMask().getWord<std::uint64_t>(w);
         full_[i] = leaves[i]->isDense();
     });
     for (const Mask& m : masks_)
@@ -87,10 +88,9 @@ void BlockLayout::make_neighbors() {
             for (int dy = -1; dy <= 1; ++dy)
                 for (int dz = -1; dz <= 1; ++dz, ++n) {
                     const Coord o = cell.origin.offsetBy(dx * size_x, dy * size_y, dz * size_z);
-                    const auto it = std::lower_bound(cells_.begin(), cells_.end(), o,
-                                                     [](const Cell& c, const Coord& at) {
-                                                         return cell_key(c.origin) < cell_key(at);
-                                                     });
+                    const auto it = std::lower_bound(
+                        cells_.begin(), cells_.end(), o,
+                        [](const Cell& c, const Coord& at) { return cell_key(c.origin) < cell_key(at); });
                     const bool found = it != cells_.end() && it->origin == o;
                     cell.neighbors[n] = found ? static_cast<std::int32_t>(it - cells_.begin()) : none;
                 }

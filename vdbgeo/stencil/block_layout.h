@@ -20,9 +20,9 @@ namespace vdbgeo::stencil {
 /// depends on what else is active.
 class BlockLayout {
  public:
-    static constexpr int leaves_x = 4, leaves_y = 4, leaves_z = 8;  ///< leaves in a cell
-    static constexpr int size_x = 32, size_y = 32, size_z = 64;     ///< voxels in a cell
-    static constexpr int max_halo = 32;                             ///< voxels
+    static constexpr int leaves_x = 4, leaves_y = 4, leaves_z = 16;  ///< leaves in a cell
+    static constexpr int size_x = 32, size_y = 32, size_z = 128;     ///< voxels in a cell
+    static constexpr int max_halo = 32;                              ///< voxels
     static constexpr std::int32_t none = -1;
 
     struct Cell {

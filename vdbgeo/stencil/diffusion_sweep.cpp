@@ -13,13 +13,15 @@
 namespace vdbgeo::stencil {
 namespace {
 
-constexpr int run_length = 4;  // cells: longer runs save halo along x, shorter ones spread better over threads
+constexpr int run_length =
+    4;  // cells: longer runs save halo along x, shorter ones spread better over threads
 
 /// Planes of a tile, the last few along x, each at x modulo their number. Rows lie on cache lines.
 class PlaneRing {
  public:
     PlaneRing(int planes, std::ptrdiff_t plane_size, float fill)
-        : planes_(planes), size_(plane_size),
+        : planes_(planes),
+          size_(plane_size),
           data_((static_cast<std::size_t>(planes * plane_size) + 2 * guard) / BlockField::brick_size + 1) {
         std::fill_n(data_.brick(0), data_.bricks() * BlockField::brick_size, fill);
     }
@@ -36,10 +38,10 @@ class PlaneRing {
 /// The arrays one thread works in.
 struct Scratch {
     struct Field {
-        std::vector<PlaneRing> u;        // two: u_k and u_{k±1}
-        std::vector<PlaneRing> powers;   // L^j u, j = 1…
-        std::vector<PlaneRing> d;        // by term; those without a diffusivity have none
-        std::vector<PlaneRing> target;   // one where it is a field of its own
+        std::vector<PlaneRing> u;         // two: u_k and u_{k±1}
+        std::vector<PlaneRing> powers;    // L^j u, j = 1…
+        std::vector<PlaneRing> d;         // by term; those without a diffusivity have none
+        std::vector<PlaneRing> target;    // one where it is a field of its own
         std::vector<PlaneRing> gathered;  // one plane, where there are several orders
     };
     std::vector<Field> fields;
@@ -62,7 +64,7 @@ class Sweep {
     Scratch make_scratch() const;
 
  private:
-    void gather(const TileGather& tile, int x, Scratch& s) const;
+    void gather(TileGather& tile, int x, Scratch& s) const;
     void advance(int k, int lead, int x_first, Scratch& s) const;
     void step(int k, int x, int margin, std::size_t field, Scratch& s) const;
     void scatter(TileGather& tile, int x, Scratch& s) const;
@@ -105,18 +107,18 @@ Scratch Sweep::make_scratch() const {
     return s;
 }
 
-void Sweep::gather(const TileGather& tile, int x, Scratch& s) const {
+void Sweep::gather(TileGather& tile, int x, Scratch& s) const {
     for (std::size_t i = 0; i < plan_.fields.size(); ++i) {
         const SweepField& f = plan_.fields[i];
         Scratch::Field& to = s.fields[i];
-        tile.copy(const_cast<const ShiftedField*>(f.state)->now(), 0, to.u[0].at(x));
-        tile.copy(plan_.begins ? const_cast<const ShiftedField*>(f.state)->now()
-                               : const_cast<const ShiftedField*>(f.before)->now(),
-                  0, to.u[1].at(x));
+        // Where there is no leaf, no face is open: any finite value will do, such as what was there before.
+        const ShiftedField &now = *f.state, &before = plan_.begins ? now : *f.before;
+        tile.copy(now.now(), {}, to.u[0].at(x));
+        tile.copy(before.now(), {}, to.u[1].at(x));
         std::size_t d = 0;
         for (const SweepTerm& t : f.terms)
             if (t.diffusivity) tile.copy(t.diffusivity, inactive, to.d[d++].at(x));
-        if (f.target) tile.copy(f.target, 0, to.target.front().at(x));
+        if (f.target) tile.copy(f.target, {}, to.target.front().at(x));
     }
     if (!s.activity.empty()) tile.activity(1, inactive, s.activity.front().at(x));
     tile.spans(spans(x, s));
@@ -165,7 +167,8 @@ void Sweep::advance(int k, int lead, int x_first, Scratch& s) const {
         for (int j = 1; j <= plan_.fields[i].terms.back().order; ++j) {
             const int x = lead - j, margin = done + j;
             if (x < x_first + margin) break;
-            PlaneRing& from = j == 1 ? f.u[static_cast<std::size_t>(k & 1)] : f.powers[static_cast<std::size_t>(j - 2)];
+            PlaneRing& from =
+                j == 1 ? f.u[static_cast<std::size_t>(k & 1)] : f.powers[static_cast<std::size_t>(j - 2)];
             kernels_.laplacian(range(x, margin, s), from.around(x), mask(s, i).around(x), weight,
                                f.powers[static_cast<std::size_t>(j - 1)].at(x));
         }
@@ -190,7 +193,8 @@ void Sweep::run(BlockLayout::Run cells, Scratch& s) const {
     for (int x = first; x < in.x_end() + halo_; ++x) {
         in.move_to(x);
         gather(in, x, s);
-        for (int k = 0; k < static_cast<int>(plan_.steps.size()); ++k) advance(k, x - k * (top_ + 1), first, s);
+        for (int k = 0; k < static_cast<int>(plan_.steps.size()); ++k)
+            advance(k, x - k * (top_ + 1), first, s);
         if (x - halo_ >= in.x_begin()) scatter(out, x - halo_, s);
     }
     kernels_.finish_writing();
@@ -211,10 +215,16 @@ ShiftedField::ShiftedField(const BlockLayout& layout) {
 int steps_per_sweep(int max_order) {
     if (const char* e = std::getenv("VDBGEO_S")) return std::atoi(e);
     switch (max_order) {
-        case 0: return 5;
-        case 1: return 3;
-        case 2: return 2;
-        default: return 1;
+        case 0:
+            return 8;
+        case 1:
+            return 4;
+        case 2:
+            return 2;
+        case 3:
+            return 2;
+        default:
+            return 1;
     }
 }
 

@@ -1,4 +1,5 @@
-// Several steps of u_t = −Σ_q L_{d_q} L^q u + β (target − u) with frozen coefficients in one pass over memory.
+// Several steps of u_t = −Σ_q L_{d_q} L^q u + β (target − u) with frozen coefficients in one pass over
+// memory.
 #pragma once
 
 #include <vector>
@@ -42,16 +43,16 @@ class ShiftedField {
 
 /// One of the fields that are stepped together.
 struct SweepField {
-    std::vector<SweepTerm> terms;     ///< by order, ascending; at least one
-    ShiftedField* state = nullptr;    ///< u_k, becomes u_{k+n}
-    ShiftedField* before = nullptr;   ///< u_{k−1}, becomes u_{k+n−1}
-    double coupling = 0;              ///< β ≥ 0
-    const float* target = nullptr;    ///< bricks of what u is drawn to; null: the other field
+    std::vector<SweepTerm> terms;    ///< by order, ascending; at least one
+    ShiftedField* state = nullptr;   ///< u_k, becomes u_{k+n}
+    ShiftedField* before = nullptr;  ///< u_{k−1}, becomes u_{k+n−1}
+    double coupling = 0;             ///< β ≥ 0
+    const float* target = nullptr;   ///< bricks of what u is drawn to; null: the other field
 };
 
 struct SweepPlan {
-    Vec3d weights = Vec3d::Ones();    ///< w_a of the axes
-    std::vector<SweepField> fields;   ///< one or two
+    Vec3d weights = Vec3d::Ones();   ///< w_a of the axes
+    std::vector<SweepField> fields;  ///< one or two
     /// α and τ of each step: u_{k+1} = α (u_k + τ A u_k) + (1 − α) u_{k−1}.
     struct Step {
         double relaxation = 1, tau = 0;
@@ -64,9 +65,10 @@ struct SweepPlan {
 /// The number of steps that fit into one pass for operators up to this order.
 int steps_per_sweep(int max_order);
 
-/// Takes the steps, all in one pass: each tile is read with a halo of steps · (order + 1) voxels, taken through
-/// all of them in cache, plane behind plane, and written once. Face between an active voxel and another: no flux
-/// (METHODS: the band-edge rule). Bitwise the same for any number of threads. `state` and `before` are turned.
+/// Takes the steps, all in one pass: each tile is read with a halo of steps · (order + 1) voxels, taken
+/// through all of them in cache, plane behind plane, and written once. Face between an active voxel and
+/// another: no flux (METHODS: the band-edge rule). Bitwise the same for any number of threads. `state` and
+/// `before` are turned.
 void sweep(const BlockLayout& layout, SweepPlan& plan, const Progress& progress = {});
 
 }  // namespace vdbgeo::stencil

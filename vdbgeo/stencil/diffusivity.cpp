@@ -21,10 +21,15 @@ std::array<float, 3> roots(const Vec3d& weights) {
 class WindowSums {
  public:
     WindowSums(const Tile& t, int radius, int quantities)
-        : tile_(t), r_(radius), width_(2 * radius + 1), row_(static_cast<std::size_t>(t.stride_y)),
-          rows_(BlockLayout::size_y), along_z_(static_cast<std::size_t>(rows_ + 2 * r_) * row_) {
+        : tile_(t),
+          r_(radius),
+          width_(2 * radius + 1),
+          row_(static_cast<std::size_t>(t.stride_y)),
+          rows_(BlockLayout::size_y),
+          along_z_(static_cast<std::size_t>(rows_ + 2 * r_) * row_) {
         planes_.resize(static_cast<std::size_t>(quantities));
-        for (auto& q : planes_) q.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(rows_) * row_);
+        for (auto& q : planes_)
+            q.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(rows_) * row_);
         sums_.resize(static_cast<std::size_t>(quantities), std::vector<double>(row_));
     }
 
@@ -52,7 +57,8 @@ class WindowSums {
     double* z_row(int y) { return along_z_.data() + static_cast<std::size_t>(y + r_) * row_; }
     double* plane_row(int quantity, int x, int y) {
         const int slot = (x + width_) % width_;
-        return planes_[static_cast<std::size_t>(quantity)].data() + static_cast<std::size_t>(slot * rows_ + y) * row_;
+        return planes_[static_cast<std::size_t>(quantity)].data() +
+               static_cast<std::size_t>(slot * rows_ + y) * row_;
     }
 
     const Tile& tile_;
@@ -114,7 +120,8 @@ class TileDiffusivity {
                 const double* means[3] = {};
                 for (int c = 0; c < components; ++c) means[c] = sums.row(2 + c, x, y);
                 kernels().variance(row_, sums.row(0, x, y), sums.row(1, x, y), means, components,
-                                   static_cast<float>(o_.scale), static_cast<float>(o_.floor), variance.data());
+                                   static_cast<float>(o_.scale), static_cast<float>(o_.floor),
+                                   variance.data());
             }
             const std::ptrdiff_t at = t_.at(x, y, -lead_);
             kernels().edge_stopping(row_, t_.scratch[3] + at, variance.data(), t_.active + at,
@@ -166,7 +173,8 @@ double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d&
                 for (int z = 0; z < BlockLayout::size_z; ++z) {
                     const std::ptrdiff_t i = t.at(x, y, z);
                     s.square += static_cast<double>(t.scratch[3][i]);
-                    for (std::size_t c = 0; c < 3; ++c) s.component[c] += static_cast<double>(t.scratch[c][i]);
+                    for (std::size_t c = 0; c < 3; ++c)
+                        s.component[c] += static_cast<double>(t.scratch[c][i]);
                 }
         }
     });

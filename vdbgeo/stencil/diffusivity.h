@@ -8,17 +8,18 @@
 namespace vdbgeo::stencil {
 
 struct Diffusivity {
-    double factor = 1;       ///< d_q0
+    double factor = 1;  ///< d_q0
     /// Window of the local variance that gives σ²: radius 1…8; 0: `sigma_squared` everywhere.
     int radius = 2;
-    bool of_gradient = false;  ///< the variance is that of ∇u, summed over its components (q ≥ 1), not that of u
+    bool of_gradient =
+        false;  ///< the variance is that of ∇u, summed over its components (q ≥ 1), not that of u
     double sigma_squared = 0;  ///< > 0 where radius is 0
     double scale = 1;          ///< multiplies the local σ²
     double floor = 0;          ///< σ² is at least this, > 0
 };
 
-/// out = factor · exp(−|∇u|²/2σ²) in active voxels, `inactive` in the others; the gradient's components times √w_a.
-/// Variances are those of a population, over the active voxels of the window.
+/// out = factor · exp(−|∇u|²/2σ²) in active voxels, `inactive` in the others; the gradient's components times
+/// √w_a. Variances are those of a population, over the active voxels of the window.
 void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights, const Diffusivity& options,
                  float* out);
 

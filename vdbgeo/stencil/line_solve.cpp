@@ -35,8 +35,8 @@ class Band {
     std::vector<double> data_;
 };
 
-/// a := tridiagonal · b, where row i of the tridiagonal is Σ f_± (v_i − v_{i±1}), f the coefficient of the face
-/// behind i.
+/// a := tridiagonal · b, where row i of the tridiagonal is Σ f_± (v_i − v_{i±1}), f the coefficient of the
+/// face behind i.
 void multiply(const std::vector<double>& faces, Band& b, Band& a) {
     const int n = b.size();
     a.reset(n, b.width() + 1);
@@ -111,11 +111,12 @@ std::array<int, 3> key(const openvdb::Coord& o, int axis) {
 }
 
 /// Goes through the 64 lines of a column of bricks and solves each run of active voxels in them.
-void solve_column(const BlockLayout& layout, const std::int32_t* bricks, std::size_t count, int axis, RunSolver& s,
-                  float* v) {
+void solve_column(const BlockLayout& layout, const std::int32_t* bricks, std::size_t count, int axis,
+                  RunSolver& s, float* v) {
     constexpr std::array<int, 3> stride{dim * dim, dim, 1};
     const int step = stride[static_cast<std::size_t>(axis)];
-    const int a = stride[static_cast<std::size_t>((axis + 1) % 3)], b = stride[static_cast<std::size_t>((axis + 2) % 3)];
+    const int a = stride[static_cast<std::size_t>((axis + 1) % 3)],
+              b = stride[static_cast<std::size_t>((axis + 2) % 3)];
     std::vector<std::size_t> places;
     const auto end_run = [&] {
         if (places.size() > 1) {
@@ -149,14 +150,15 @@ void solve_column(const BlockLayout& layout, const std::int32_t* bricks, std::si
 
 }  // namespace
 
-void solve_lines(const BlockLayout& layout, const std::vector<SweepTerm>& terms, const Vec3d& weights, double c,
-                 float* v) {
+void solve_lines(const BlockLayout& layout, const std::vector<SweepTerm>& terms, const Vec3d& weights,
+                 double c, float* v) {
     if (c == 0) return;
     for (int axis = 0; axis < 3; ++axis) {
         std::vector<std::int32_t> bricks(layout.brick_count());
         for (std::size_t i = 0; i < bricks.size(); ++i) bricks[i] = static_cast<std::int32_t>(i);
         const auto at = [&](std::int32_t i) { return key(layout.origin(static_cast<std::size_t>(i)), axis); };
-        tbb::parallel_sort(bricks.begin(), bricks.end(), [&](std::int32_t i, std::int32_t j) { return at(i) < at(j); });
+        tbb::parallel_sort(bricks.begin(), bricks.end(),
+                           [&](std::int32_t i, std::int32_t j) { return at(i) < at(j); });
         std::vector<Column> columns;
         for (std::size_t i = 0; i < bricks.size(); ++i) {
             auto before = i > 0 ? at(bricks[i - 1]) : std::array<int, 3>{};
@@ -167,7 +169,8 @@ void solve_lines(const BlockLayout& layout, const std::vector<SweepTerm>& terms,
         parallel_for(columns.size(), 1, [&](std::size_t i) {
             RunSolver s{terms, weights[axis], c, {}, {}, {}, {}, {}, {}, {}};
             s.d.resize(terms.size());
-            solve_column(layout, bricks.data() + columns[i].begin, columns[i].end - columns[i].begin, axis, s, v);
+            solve_column(layout, bricks.data() + columns[i].begin, columns[i].end - columns[i].begin, axis, s,
+                         v);
         });
     }
 }

@@ -8,18 +8,20 @@
 
 namespace vdbgeo::stencil {
 
+/// Kernels work on whole vectors of this many floats; rows are a multiple of it long, at most 16 of them.
+constexpr int lanes = 16;
+
 /// The z-range [begin, end) of a row outside of which no voxel is active; empty where begin ≥ end.
 struct RowSpan {
     std::int16_t begin, end;
     bool solid = false;  ///< every voxel of the range is active
+    /// Bit i: the i-th vector of `lanes` voxels of the row has active ones.
+    std::uint16_t vectors = 0xffff;
 };
 
-/// Kernels work on whole vectors of this many floats; rows are a multiple of it long.
-constexpr int lanes = 16;
-
-/// Rows [y_begin, y_end) of a plane: where a kernel works. Rows are `stride` floats apart; spans[y] tells which
-/// part of row y is needed. A kernel may compute more of a row: up to whole vectors. Inside
-/// of solid ranges that the four rows around share, all faces are open; `before` and `after` are the spans of the
+/// Rows [y_begin, y_end) of a plane: where a kernel works. Rows are `stride` floats apart; spans[y] tells
+/// which part of row y is needed. A kernel may compute more of a row: up to whole vectors. Inside of solid
+/// ranges that the four rows around share, all faces are open; `before` and `after` are the spans of the
 /// planes beside this one, not looked at where spans[y] is not solid.
 struct PlaneRange {
     int y_begin, y_end;
@@ -54,7 +56,8 @@ struct Kernels {
     /// out = L u = Σ_a w_a Σ (u_i − u_n) over the faces to active voxels; `d` tells which are.
     void (*laplacian)(const PlaneRange&, const Planes& u, const Planes& d, const float weight[3], float* out);
     /// out = Σ_a weight_a Σ max(0, d_i + d_n)(w_n − w_i), added to what is there or not.
-    void (*flux)(const PlaneRange&, const Planes& w, const Planes& d, const float weight[3], bool add, float* out);
+    void (*flux)(const PlaneRange&, const Planes& w, const Planes& d, const float weight[3], bool add,
+                 float* out);
     void (*step)(const PlaneRange&, const StepPlane&);
     /// Copies rows of 8 floats; `from` has them one behind the other, `to` has them `stride` apart.
     void (*spread)(const float* from, int rows, float* to, std::ptrdiff_t stride);

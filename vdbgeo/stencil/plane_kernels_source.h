@@ -11,28 +11,30 @@ namespace vdbgeo::stencil {
 namespace {
 
 /// The rows of a range that have active voxels, cut to whole vectors.
-#define VDBGEO_FOR_ROWS(range, y, z0, z1)                                           \
-    for (int y = (range).y_begin; y < (range).y_end; ++y)                           \
-        if (const int z0 = (range).spans[y].begin / lanes * lanes,                  \
-            z1 = (range).spans[y].end;                                              \
+#define VDBGEO_FOR_ROWS(range, y, z0, z1)                                                     \
+    for (int y = (range).y_begin; y < (range).y_end; ++y)                                     \
+        if (const int z0 = (range).spans[y].begin / lanes * lanes, z1 = (range).spans[y].end, \
+            vectors = (range).spans[y].vectors;                                               \
             z0 < z1)
 
 /// One vector. `ivdep` is true: the arrays written to are read at the same place only.
 #define VDBGEO_LANES(z, block) _Pragma("GCC ivdep") for (std::ptrdiff_t z = block; z < block + lanes; ++z)
-#define VDBGEO_FOR_LANES(z, z0, z1) \
-    for (std::ptrdiff_t block = z0; block < z1; block += lanes) VDBGEO_LANES(z, block)
+#define VDBGEO_FOR_LANES(z, z0, z1)                             \
+    for (std::ptrdiff_t block = z0; block < z1; block += lanes) \
+        if (vectors >> (block / lanes) & 1) VDBGEO_LANES(z, block)
 
 /// The same statement for vectors with all faces open (`solid` is true in it) and for the others.
-#define VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1, ...)                     \
-    const Open open = open_part(range, y);                                     \
-    for (std::ptrdiff_t block = z0; block < z1; block += lanes) {               \
-        if (block >= open.begin && block + lanes <= open.end) {                 \
-            constexpr bool solid = true;                                        \
-            VDBGEO_LANES(z, block) __VA_ARGS__;                                 \
-        } else {                                                                \
-            constexpr bool solid = false;                                       \
-            VDBGEO_LANES(z, block) __VA_ARGS__;                                 \
-        }                                                                       \
+#define VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1, ...)       \
+    const Open open = open_part(range, y);                        \
+    for (std::ptrdiff_t block = z0; block < z1; block += lanes) { \
+        if (!(vectors >> (block / lanes) & 1)) continue;          \
+        if (block >= open.begin && block + lanes <= open.end) {   \
+            constexpr bool solid = true;                          \
+            VDBGEO_LANES(z, block) __VA_ARGS__;                   \
+        } else {                                                  \
+            constexpr bool solid = false;                         \
+            VDBGEO_LANES(z, block) __VA_ARGS__;                   \
+        }                                                         \
     }
 
 /// Where all faces of a row's voxels are open.
@@ -97,11 +99,12 @@ void laplacian(const PlaneRange& range, const Planes& u_in, const Planes& d_in, 
 
 /// The sum of a voxel's fluxes, weighted by axis. o: offset of the voxel.
 template <bool solid>
-inline float flux_at(const Planes& w, const Planes& d, std::ptrdiff_t o, std::ptrdiff_t stride, float wx, float wy,
-                     float wz) {
+inline float flux_at(const Planes& w, const Planes& d, std::ptrdiff_t o, std::ptrdiff_t stride, float wx,
+                     float wy, float wz) {
     const float *const c = w.here, *const m = d.here;
     const float v = c[o], e = m[o];
-    const float x = face<solid>(e, d.before[o]) * (w.before[o] - v) + face<solid>(e, d.after[o]) * (w.after[o] - v);
+    const float x =
+        face<solid>(e, d.before[o]) * (w.before[o] - v) + face<solid>(e, d.after[o]) * (w.after[o] - v);
     const float y = face<solid>(e, m[o - stride]) * (c[o - stride] - v) +
                     face<solid>(e, m[o + stride]) * (c[o + stride] - v);
     const float z = face<solid>(e, m[o - 1]) * (c[o - 1] - v) + face<solid>(e, m[o + 1]) * (c[o + 1] - v);
@@ -125,10 +128,10 @@ void flux(const PlaneRange& range, const Planes& w_in, const Planes& d_in, const
 }
 
 /// here − next is 0 where nothing changes, so constant regions stay what they are to the last bit.
-#define VDBGEO_STEP(extra)                                       \
-    VDBGEO_FOR_LANES_BY_FACES(range, y, z, z0, z1,               \
-                              next[z] += a * (here[z] - next[z]) + \
-                                         (flux_at<solid>(w, d, o + z, stride, wx, wy, wz) extra))
+#define VDBGEO_STEP(extra)     \
+    VDBGEO_FOR_LANES_BY_FACES( \
+        range, y, z, z0, z1,   \
+        next[z] += a * (here[z] - next[z]) + (flux_at<solid>(w, d, o + z, stride, wx, wy, wz) extra))
 
 void step(const PlaneRange& range, const StepPlane& s) {
     const Planes w = s.w, d = s.d;
@@ -138,7 +141,8 @@ void step(const PlaneRange& range, const StepPlane& s) {
         const std::ptrdiff_t o = y * stride;
         const float* const here = s.here + o;
         float* __restrict const next = s.next + o;
-        const float *const more = s.gathered + (s.gathered ? o : 0), *const target = s.target + (s.target ? o : 0);
+        const float *const more = s.gathered + (s.gathered ? o : 0), *const target =
+                                                                         s.target + (s.target ? o : 0);
         if (s.gathered && s.target) {
             VDBGEO_STEP(+more[z] + f * (target[z] - here[z]))
         } else if (s.gathered) {
@@ -192,9 +196,8 @@ inline float exponential(float x) {
     const float shifted = y + 12582912.0f;  // 1.5 · 2^23: rounds to an integer in the low bits
     const float n = shifted - 12582912.0f, g = (y - n) * 0.693147181f;
     const float p =
-        1.0f +
-        g * (1.0f +
-             g * (0.5f + g * (0.166666667f + g * (0.0416666667f + g * (0.00833333333f + g * 0.00138888889f)))));
+        1.0f + g * (1.0f + g * (0.5f + g * (0.166666667f + g * (0.0416666667f +
+                                                                g * (0.00833333333f + g * 0.00138888889f)))));
     union {
         float value;
         std::int32_t bits;
@@ -282,7 +285,8 @@ void sum_rows(std::size_t n, int count, const double* const* in, double* __restr
 }
 
 void variance(std::size_t n, const double* __restrict count, const double* __restrict square,
-              const double* const* sums, int components, float factor, float floor, float* __restrict result) {
+              const double* const* sums, int components, float factor, float floor,
+              float* __restrict result) {
     const double *const s0 = sums[0], *const s1 = components > 1 ? sums[1] : nullptr,
                         *const s2 = components > 2 ? sums[2] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
@@ -300,7 +304,17 @@ void variance(std::size_t n, const double* __restrict count, const double* __res
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), laplacian, flux, step, spread, collect, finish_writing, gradient,
-                                window_sum, sum_rows, variance, edge_stopping};
+const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS),
+                                laplacian,
+                                flux,
+                                step,
+                                spread,
+                                collect,
+                                finish_writing,
+                                gradient,
+                                window_sum,
+                                sum_rows,
+                                variance,
+                                edge_stopping};
 
 }  // namespace vdbgeo::stencil

@@ -34,21 +34,24 @@ TileGather::TileGather(const BlockLayout& layout, BlockLayout::Run run, int halo
 }
 
 void TileGather::find_bricks(int layer, std::int32_t* to) const {
-    const int cell_x = std::clamp(floor_div(layer * dim - x_begin_, BlockLayout::size_x), -1, run_.last - run_.first);
+    const int cell_x =
+        std::clamp(floor_div(layer * dim - x_begin_, BlockLayout::size_x), -1, run_.last - run_.first);
     // The run's cell next to it: neighbours of the cells at the ends reach beyond the run.
     const int base = std::clamp(cell_x, 0, run_.last - run_.first - 1);
     const auto& cell = layout_.cells()[static_cast<std::size_t>(run_.first + base)];
     const int lx = layer & (BlockLayout::leaves_x - 1);
     const BlockLayout::Cell* around[3][3];
     for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz) around[dy + 1][dz + 1] = layout_.neighbor(cell, cell_x - base, dy, dz);
+        for (int dz = -1; dz <= 1; ++dz)
+            around[dy + 1][dz + 1] = layout_.neighbor(cell, cell_x - base, dy, dz);
     for (int j = 0; j < y_count_; ++j)
         for (int k = 0; k < z_count_; ++k, ++to) {
             const int ly = y_[j].leaf, lz = z_[k].leaf;
             const int dy = floor_div(ly, BlockLayout::leaves_y), dz = floor_div(lz, BlockLayout::leaves_z);
             const BlockLayout::Cell* c = around[dy + 1][dz + 1];
-            const int slot = (lx * BlockLayout::leaves_y + ly - dy * BlockLayout::leaves_y) * BlockLayout::leaves_z +
-                             lz - dz * BlockLayout::leaves_z;
+            const int slot =
+                (lx * BlockLayout::leaves_y + ly - dy * BlockLayout::leaves_y) * BlockLayout::leaves_z + lz -
+                dz * BlockLayout::leaves_z;
             *to = c ? c->bricks[static_cast<std::size_t>(slot)] : BlockLayout::none;
         }
 }
@@ -70,7 +73,7 @@ void TileGather::move_to(int x) {
         ++leaves_here_;
         regular_ = regular_ && layout_.full(static_cast<std::size_t>(bricks_[i]));
     }
-    if (regular_) find_spans(regular_spans_.data());
+    spans_known_ = false;
 }
 
 template <class Body>
@@ -80,7 +83,7 @@ void TileGather::for_leaves(const Body& body) const {
         for (int k = 0; k < z_count_; ++k, ++brick) body(*brick, y_[j], z_[k]);
 }
 
-void TileGather::copy(const float* bricks, float absent, float* plane) const {
+void TileGather::copy(const float* bricks, std::optional<float> absent, float* plane) const {
     const int in_leaf = x_ & (dim - 1);
     // Reading is bound by latency: ask for what the next plane needs.
     const std::int32_t* const soon = in_leaf < dim - 1 ? bricks_ : next_bricks_;
@@ -93,12 +96,13 @@ void TileGather::copy(const float* bricks, float absent, float* plane) const {
         }
         float* to = plane + y.at * stride_ + z.at;
         if (brick == BlockLayout::none) {
-            for (int r = y.from; r < y.to; ++r, to += stride_) std::fill_n(to, dim, absent);
+            if (!absent) return;
+            for (int r = y.from; r < y.to; ++r, to += stride_) std::fill_n(to, dim, *absent);
             return;
         }
-        kernels_.spread(
-            bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + (in_leaf * dim + y.from) * dim,
-            y.to - y.from, to, stride_);
+        kernels_.spread(bricks + static_cast<std::size_t>(brick) * BlockField::brick_size +
+                            (in_leaf * dim + y.from) * dim,
+                        y.to - y.from, to, stride_);
     });
 }
 
@@ -110,31 +114,37 @@ void TileGather::activity(float on, float off, float* plane) const {
                 std::fill_n(to, dim, brick == BlockLayout::none ? off : on);
             return;
         }
-        const std::uint64_t word = layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
+        const std::uint64_t word =
+            layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
         for (int r = y.from; r < y.to; ++r, to += stride_)
             for (int i = 0; i < dim; ++i) to[i] = word >> (r * dim + i) & 1 ? on : off;
     });
 }
 
-void TileGather::spans(RowSpan* spans) const {
-    if (regular_)
-        std::copy_n(regular_spans_.data(), rows_of(halo_), spans);
-    else
+void TileGather::spans(RowSpan* spans) {
+    if (!regular_) {
         find_spans(spans);
+        return;
+    }
+    if (!spans_known_) find_spans(regular_spans_.data());
+    spans_known_ = true;
+    std::copy_n(regular_spans_.data(), rows_of(halo_), spans);
 }
 
 void TileGather::find_spans(RowSpan* spans) const {
     const auto all = static_cast<std::int16_t>(BlockLayout::size_z + 2 * lead_of(halo_));
-    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = {all, 0, true};
+    for (int r = 0; r < rows_of(halo_); ++r) spans[r] = {all, 0, true, 0};
     int active[BlockLayout::size_y + 2 * BlockLayout::max_halo] = {};
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
         if (brick == BlockLayout::none) return;
-        const std::uint64_t word = layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
+        const std::uint64_t word =
+            layout_.mask(static_cast<std::size_t>(brick))[static_cast<std::size_t>(x_ & 7)];
         for (int r = y.from, at = y.at; r < y.to; ++r, ++at) {
             const unsigned bits = static_cast<unsigned>(word >> (r * dim)) & 0xff;
             if (!bits) continue;
             RowSpan& s = spans[at];
             s.begin = std::min(s.begin, static_cast<std::int16_t>(z.at + __builtin_ctz(bits)));
+            s.vectors = static_cast<std::uint16_t>(s.vectors | 1u << (z.at / lanes));
             s.end = std::max(s.end, static_cast<std::int16_t>(z.at + 32 - __builtin_clz(bits)));
             active[at] += static_cast<int>((bits * 0x200040008001ULL & 0x111111111111111ULL) % 15);
         }
@@ -146,7 +156,8 @@ void TileGather::scatter(const float* plane, float* bricks) const {
     const int in_leaf = (x_ & (dim - 1)) * dim * dim;
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
         if (brick == BlockLayout::none) return;
-        if (y.leaf < 0 || y.leaf >= BlockLayout::leaves_y || z.leaf < 0 || z.leaf >= BlockLayout::leaves_z) return;
+        if (y.leaf < 0 || y.leaf >= BlockLayout::leaves_y || z.leaf < 0 || z.leaf >= BlockLayout::leaves_z)
+            return;
         kernels_.collect(plane + y.at * stride_ + z.at, stride_,
                          bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + in_leaf);
     });

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "vdbgeo/stencil/block_layout.h"
 #include "vdbgeo/stencil/plane_kernels.h"
@@ -21,7 +22,9 @@ class TileGather {
     static int rows_of(int halo) { return BlockLayout::size_y + 2 * halo; }
     /// Voxels in a row before the run's first.
     static int lead_of(int halo) { return (halo + 7) / 8 * 8; }
-    static int stride_of(int halo) { return (BlockLayout::size_z + 2 * lead_of(halo) + lanes - 1) / lanes * lanes; }
+    static int stride_of(int halo) {
+        return (BlockLayout::size_z + 2 * lead_of(halo) + lanes - 1) / lanes * lanes;
+    }
     /// x of the run's first voxel, and behind its last: planes may be moved to from begin − halo on.
     int x_begin() const { return x_begin_; }
     int x_end() const { return x_end_; }
@@ -30,19 +33,20 @@ class TileGather {
     void move_to(int x);
     /// True where no voxel of the plane is active, halo included.
     bool empty() const { return leaves_here_ == 0; }
-    /// The plane of a field; `absent` where there is no leaf.
-    void copy(const float* bricks, float absent, float* plane) const;
+    /// The plane of a field; `absent` where there is no leaf, or what the plane had there.
+    void copy(const float* bricks, std::optional<float> absent, float* plane) const;
     /// `on` where voxels are active, `off` elsewhere.
     void activity(float on, float off, float* plane) const;
     /// The active part of each row.
-    void spans(RowSpan* rows) const;
+    void spans(RowSpan* rows);
     /// Writes the plane, without its halo, into the bricks of the run. End with Kernels::finish_writing.
     void scatter(const float* plane, float* bricks) const;
 
  private:
     static constexpr int most = 4;  // leaves of the widest halo
     struct Part {                   // what of the leaves in one line of y or z belongs to the tile
-        int leaf, from, to, at;     // leaf number from the cell's first; voxels [from, to) of it; place in the plane
+        int leaf, from, to,
+            at;  // leaf number from the cell's first; voxels [from, to) of it; place in the plane
     };
     static int parts(int leaves, int halo, Part* out);
     void find_spans(RowSpan* rows) const;
@@ -58,7 +62,7 @@ class TileGather {
     Part y_[BlockLayout::leaves_y + 2 * most], z_[BlockLayout::leaves_z + 2 * most];
     int y_count_, z_count_, leaves_here_ = 0;
     /// Every leaf of the layer is full or missing: its planes have the same spans.
-    bool regular_ = false;
+    bool regular_ = false, spans_known_ = false;
     std::array<RowSpan, BlockLayout::size_y + 2 * BlockLayout::max_halo> regular_spans_;
     const Kernels& kernels_;
     using Bricks = std::int32_t[(BlockLayout::leaves_y + 2 * most) * (BlockLayout::leaves_z + 2 * most)];

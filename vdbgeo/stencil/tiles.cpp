@@ -14,8 +14,12 @@ namespace {
 
 struct Shape {
     explicit Shape(int h)
-        : halo(h), planes(BlockLayout::size_x + 2 * h), rows(TileGather::rows_of(h)),
-          stride(TileGather::stride_of(h)), lead(TileGather::lead_of(h)), plane(rows * stride),
+        : halo(h),
+          planes(BlockLayout::size_x + 2 * h),
+          rows(TileGather::rows_of(h)),
+          stride(TileGather::stride_of(h)),
+          lead(TileGather::lead_of(h)),
+          plane(rows * stride),
           guard(2 * lanes) {}
     int halo, planes, rows;
     std::ptrdiff_t stride, lead, plane, guard;
@@ -68,9 +72,10 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
         RowSpan* spans = a.spans.data() + (x + s.halo) * s.rows;
         gather.spans(spans);
         for (int r = 0; r < s.rows; ++r) {
-            spans[r].begin = static_cast<std::int16_t>(std::max<std::ptrdiff_t>(spans[r].begin - s.lead, -s.halo));
-            spans[r].end =
-                static_cast<std::int16_t>(std::min<std::ptrdiff_t>(spans[r].end - s.lead, BlockLayout::size_z + s.halo));
+            spans[r].begin =
+                static_cast<std::int16_t>(std::max<std::ptrdiff_t>(spans[r].begin - s.lead, -s.halo));
+            spans[r].end = static_cast<std::int16_t>(
+                std::min<std::ptrdiff_t>(spans[r].end - s.lead, BlockLayout::size_z + s.halo));
         }
     }
     for (float* out : t.out)
@@ -78,16 +83,18 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
     body(t);
     for (int x = 0; x < BlockLayout::size_x; ++x) {
         gather.move_to(t.origin.x() + x);
-        for (std::size_t i = 0; i < f.out.size(); ++i) gather.scatter(t.out[i] + x * s.plane - corner, f.out[i]);
+        for (std::size_t i = 0; i < f.out.size(); ++i)
+            gather.scatter(t.out[i] + x * s.plane - corner, f.out[i]);
     }
     kernels().finish_writing();
 }
 
 }  // namespace
 
-void for_each_tile(const BlockLayout& layout, const TileFields& fields, const std::function<void(Tile&)>& body,
-                   const Progress& progress) {
-    if (fields.halo < 0 || fields.halo > BlockLayout::max_halo) throw InvalidInput("the halo of a tile is too wide");
+void for_each_tile(const BlockLayout& layout, const TileFields& fields,
+                   const std::function<void(Tile&)>& body, const Progress& progress) {
+    if (fields.halo < 0 || fields.halo > BlockLayout::max_halo)
+        throw InvalidInput("the halo of a tile is too wide");
     const Shape shape(fields.halo);
     tbb::enumerable_thread_specific<Arrays> arrays([&] { return Arrays(shape, fields); });
     std::atomic<std::size_t> done{0};

@@ -11,19 +11,19 @@
 
 namespace vdbgeo::stencil {
 
-/// A cell with its halo as dense arrays: voxel (x, y, z), counted from the cell's origin and from −halo on, at
-/// at(x, y, z) of each array; rows along z, `stride_y` floats apart, planes `stride_x` apart, one array behind
-/// the other. Arrays have a guard of zeros before and behind.
+/// A cell with its halo as dense arrays: voxel (x, y, z), counted from the cell's origin and from −halo on,
+/// at at(x, y, z) of each array; rows along z, `stride_y` floats apart, planes `stride_x` apart, one array
+/// behind the other. Arrays have a guard of zeros before and behind.
 struct Tile {
-    std::size_t cell;               ///< its number in the layout
-    openvdb::Coord origin;          ///< index of the cell's first voxel
+    std::size_t cell;       ///< its number in the layout
+    openvdb::Coord origin;  ///< index of the cell's first voxel
     int halo;
-    int lead;                       ///< rows begin in memory, on a cache line, at z = −lead ≤ −halo
+    int lead;  ///< rows begin in memory, on a cache line, at z = −lead ≤ −halo
     std::ptrdiff_t stride_x, stride_y;
-    std::vector<float*> in;         ///< the gathered fields; 0 in voxels that are not active
-    float* active;                  ///< 1 in active voxels, 0 in the others
-    std::vector<float*> scratch;    ///< arrays of the same shape, to work in; not cleared from tile to tile
-    std::vector<float*> out;        ///< what is copied back of the cell's active leaves; 0 before
+    std::vector<float*> in;       ///< the gathered fields; 0 in voxels that are not active
+    float* active;                ///< 1 in active voxels, 0 in the others
+    std::vector<float*> scratch;  ///< arrays of the same shape, to work in; not cleared from tile to tile
+    std::vector<float*> out;      ///< what is copied back of the cell's active leaves; 0 before
 
     std::ptrdiff_t at(int x, int y, int z) const { return x * stride_x + y * stride_y + z; }
     /// Active part of the row, z counted as above; empty where begin ≥ end.
@@ -41,7 +41,7 @@ struct TileFields {
 
 /// Runs body(tile) for every cell, in parallel; each thread has its own arrays. (32+2h)² (64+2h') floats an
 /// array. Only active voxels of the cell may be written with something else than 0 in `out`.
-void for_each_tile(const BlockLayout& layout, const TileFields& fields, const std::function<void(Tile&)>& body,
-                   const Progress& progress = {});
+void for_each_tile(const BlockLayout& layout, const TileFields& fields,
+                   const std::function<void(Tile&)>& body, const Progress& progress = {});
 
 }  // namespace vdbgeo::stencil

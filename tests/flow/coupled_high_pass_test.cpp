@@ -179,6 +179,8 @@ TEST(HighPass, WithoutCouplingIsTheLowPassTakenAway) {
     o.time = 3;
     coupled_high_pass(*grid, o);
     HyperdiffusionOptions same;
+    same.terms = {{o.order, o.fast}};
+    same.sigma = o.sigma;
     same.time = 3;
     hyperdiffuse(*low, same);
     for (auto it = input->cbeginValueOn(); it; ++it)

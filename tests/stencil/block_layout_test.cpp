@@ -20,7 +20,7 @@ using stencil::BlockLayout;
 int floored(int a, int b) { return static_cast<int>(std::floor(static_cast<double>(a) / b)); }
 
 Coord cell_origin(const Coord& c) {
-    return {floored(c.x(), 32) * 32, floored(c.y(), 32) * 32, floored(c.z(), 64) * 64};
+    return {floored(c.x(), 32) * 32, floored(c.y(), 32) * 32, floored(c.z(), BlockLayout::size_z) * BlockLayout::size_z};
 }
 
 class LayoutOf : public testing::TestWithParam<std::string> {};
@@ -65,8 +65,9 @@ TEST_P(LayoutOf, PutsLeavesIntoCellsAndCellsIntoOrder) {
             }
             for (int x = 0; x < 4; ++x)
                 for (int y = 0; y < 4; ++y)
-                    for (int z = 0; z < 8; ++z) {
-                        const std::int32_t b = cell.bricks[static_cast<std::size_t>((x * 4 + y) * 8 + z)];
+                    for (int z = 0; z < BlockLayout::leaves_z; ++z) {
+                        const std::int32_t b =
+                            cell.bricks[static_cast<std::size_t>((x * 4 + y) * BlockLayout::leaves_z + z)];
                         if (b == BlockLayout::none) continue;
                         EXPECT_EQ(b, brick_before + 1) << "bricks lie in the order in which they are swept";
                         brick_before = b;
@@ -91,7 +92,7 @@ TEST_P(LayoutOf, KnowsTheNeighboursOfItsCells) {
         for (int x = -1; x <= 1; ++x)
             for (int y = -1; y <= 1; ++y)
                 for (int z = -1; z <= 1; ++z) {
-                    const Coord at = cell.origin.offsetBy(32 * x, 32 * y, 64 * z);
+                    const Coord at = cell.origin.offsetBy(32 * x, 32 * y, BlockLayout::size_z * z);
                     const BlockLayout::Cell* expected = nullptr;
                     for (const BlockLayout::Cell& other : layout.cells())
                         if (other.origin == at) expected = &other;

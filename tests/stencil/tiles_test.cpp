@@ -37,7 +37,7 @@ TEST_P(TilesOf, HoldWhatTheGridHolds) {
             for (int x = -halo; x < 32 + halo; ++x)
                 for (int y = -halo; y < 32 + halo; ++y) {
                     const stencil::RowSpan span = t.span(x, y);
-                    for (int z = -halo; z < 64 + halo; ++z) {
+                    for (int z = -halo; z < BlockLayout::size_z + halo; ++z) {
                         const Coord c = t.origin.offsetBy(x, y, z);
                         const bool on = accessor.isValueOn(c);
                         const float v = on ? accessor.getValue(c) : 0.0f;
@@ -45,7 +45,7 @@ TEST_P(TilesOf, HoldWhatTheGridHolds) {
                         bad += t.active[t.at(x, y, z)] != (on ? 1.0f : 0.0f);
                         bad += on && (z < span.begin || z >= span.end);
                     }
-                    bad += span.begin < span.end && (span.begin < -halo || span.end > 64 + halo);
+                    bad += span.begin < span.end && (span.begin < -halo || span.end > BlockLayout::size_z + halo);
                 }
             wrong += bad;
             ++tiles;
@@ -70,7 +70,7 @@ TEST_P(TilesOf, WriteBackTheirOwnVoxels) {
                 for (int z = -1; z < 65; ++z) t.scratch[0][t.at(x, y, z)] = t.in[0][t.at(x, y, z)];
         for (int x = 0; x < 32; ++x)
             for (int y = 0; y < 32; ++y)
-                for (int z = 0; z < 64; ++z) {
+                for (int z = 0; z < BlockLayout::size_z; ++z) {
                     EXPECT_EQ(t.out[0][t.at(x, y, z)], 0.0f);
                     if (t.active[t.at(x, y, z)] == 0) continue;
                     const float* s = t.scratch[0] + t.at(x, y, z);

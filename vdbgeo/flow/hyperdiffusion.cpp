@@ -191,7 +191,7 @@ HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const Hyperdiffusion
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
     if (grid.activeVoxelCount() == 0) return report;
     report.automatic = !options.time && !options.steps;
-    if (report.automatic) report.noise = estimate_noise(grid);
+    if (report.automatic) report.noise = removable_noise(grid);
     DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma);
     const double step = solver.step(options.stepper, options.dt);
     if (!report.automatic)

@@ -1,5 +1,5 @@
 // The working layout of the stencil operators: the active leaves of a grid as bricks in one array, and the
-// cells of 4 × 4 × 8 leaves that tiles are made of.
+// cells of 4 × 4 × 16 leaves that tiles are made of.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -13,7 +13,7 @@ namespace vdbgeo::stencil {
 /// The leaves of a tree that have active voxels, in the order in which operators go through them, with their
 /// masks. A brick is a leaf's 512 floats as OpenVDB orders them (z fastest).
 ///
-/// Leaves are gathered in cells of 32 × 32 × 64 voxels at multiples of these; each cell knows its leaves and
+/// Leaves are gathered in cells of 32 × 32 × 128 voxels at multiples of these; each cell knows its leaves and
 /// its 26 neighbours, so that a tile with a halo of up to 32 voxels is gathered without a search. Cells are
 /// sorted by y ("slabs": all cells of one y), then z, then x; a run of cells along x has its bricks in the
 /// order in which it is swept. Coordinates are those of the grid; cells lie at absolute positions, so nothing

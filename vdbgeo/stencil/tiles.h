@@ -39,7 +39,7 @@ struct TileFields {
     int scratch = 0;               ///< how many arrays to work in
 };
 
-/// Runs body(tile) for every cell, in parallel; each thread has its own arrays. (32+2h)² (64+2h') floats an
+/// Runs body(tile) for every cell, in parallel; each thread has its own arrays. (32+2h)² (128+2h') floats an
 /// array. Only active voxels of the cell may be written with something else than 0 in `out`.
 void for_each_tile(const BlockLayout& layout, const TileFields& fields,
                    const std::function<void(Tile&)>& body, const Progress& progress = {});

@@ -81,20 +81,35 @@ TEST_P(AdiOf, CosineModesHasTheAmplitudesOfItsFormula) {
         }
 }
 
-TEST_P(AdiOf, NoiseIsStableFarAboveTheExplicitBound) {
+/// Takes the steps on noise: it is smoothed, and its mean is kept.
+void expect_smoothing(openvdb::FloatGrid& grid, const HyperdiffusionOptions& o) {
+    const double mean = mean_of(grid), variance = variance_of(grid);
+    const HyperdiffusionReport report = hyperdiffuse(grid, o);
+    EXPECT_LT(variance_of(grid), variance);
+    EXPECT_NEAR(mean_of(grid), mean, 1e-4);
+    EXPECT_NEAR(report.mean_after, mean_of(grid), 1e-6);
+}
+
+TEST_P(AdiOf, NoiseInABoxIsStableFarAboveTheExplicitBound) {
+    test::SparseMaker make(21);
+    const auto grid = test::box_grid(test::box_of(Coord(-5, 3, 60), 14, 17, 12),
+                                     [&](const Coord&) { return 2 * make.uniform() - 1; });
+    HyperdiffusionOptions o = adi_options(GetParam());
+    o.steps = 40;
+    o.dt = 100 * bound_of(o);
+    expect_smoothing(*grid, o);
+}
+
+/// Where the operators of the axes do not commute: with the step it takes by itself.
+TEST_P(AdiOf, NoiseOnAnyMaskIsStableWithTheStepOfItsOwn) {
     for (const std::string kind : {"leaf corner", "few leaves", "shell"})
         for (const Kind sigma : {Kind::infinite, Kind::local}) {
             SCOPED_TRACE(kind + (sigma == Kind::local ? ", edges kept" : ""));
             const auto grid = test::sparse_grid(kind, 21);
-            const double mean = mean_of(*grid), variance = variance_of(*grid);
             HyperdiffusionOptions o = adi_options(GetParam());
             o.sigma.kind = sigma;
-            o.steps = 60;
-            o.dt = 100 * bound_of(o);
-            const HyperdiffusionReport report = hyperdiffuse(*grid, o);
-            EXPECT_LT(variance_of(*grid), variance);
-            EXPECT_NEAR(mean_of(*grid), mean, 1e-4);
-            EXPECT_NEAR(report.mean_after, mean_of(*grid), 1e-6);
+            o.steps = 40;
+            expect_smoothing(*grid, o);
         }
 }
 
@@ -105,7 +120,7 @@ TEST_P(AdiOf, SmallStepsGoToEulersSolutionInFirstOrder) {
     o.time = 4 * bound_of(o);
     HyperdiffusionOptions fine = o;
     fine.stepper = Stepper::euler;
-    fine.dt = *o.time / 2000;
+    fine.dt = *o.time / 1000;
     const auto exact = box.grid();
     hyperdiffuse(*exact, fine);
     std::vector<double> errors;

@@ -37,7 +37,7 @@ struct DiffusionTerm {
 enum class Stepper {
     fsi,    ///< fast semi-iterative cycles (Hafner, Ochs, Weickert, Reißel, Grewenig 2016)
     euler,  ///< explicit
-    adi     ///< semi-implicit, one line solve an axis
+    adi     ///< semi-implicit, one line solve an axis; far above the bound stable in boxes alone
 };
 
 struct HyperdiffusionOptions {

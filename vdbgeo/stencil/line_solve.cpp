@@ -75,13 +75,40 @@ struct RunSolver {
     std::vector<double> ones, faces, v;
     std::vector<std::vector<float>> d;  // by term: the diffusivities of the run
 
+    /// Faces between voxel i and the next of a term, times c.
+    void find_faces(std::size_t t) {
+        faces.assign(v.size(), weight * terms[t].factor * c);
+        if (terms[t].diffusivity)
+            for (std::size_t i = 0; i + 1 < faces.size(); ++i)
+                faces[i] *= 0.5 * (static_cast<double>(d[t][i]) + d[t][i + 1]);
+    }
+
+    /// Order 0 alone: the matrix is tridiagonal, symmetric and diagonally dominant. `ones` takes what is
+    /// eliminated.
+    void solve_tridiagonal() {
+        find_faces(0);
+        const std::size_t n = v.size();
+        ones.resize(n);
+        double behind = 0, ratio = 0, value = 0;  // of the row before
+        for (std::size_t i = 0; i < n; ++i) {
+            const double ahead = i + 1 < n ? faces[i] : 0;
+            const double pivot = 1 / (1 + ahead + behind * (1 - ratio));
+            value = (v[i] + behind * value) * pivot;
+            v[i] = value;
+            ones[i] = ratio = ahead * pivot;
+            behind = ahead;
+        }
+        for (std::size_t i = n - 1; i-- > 0;) v[i] += ones[i] * v[i + 1];
+    }
+
     void solve() {
+        if (terms.size() == 1 && terms[0].order == 0) return solve_tridiagonal();
         const int n = static_cast<int>(v.size());
         const int width = terms.back().order + 1;
         matrix.reset(n, width);
         for (int i = 0; i < n; ++i) matrix.at(i, i) = 1;
         power.reset(n, 0);
-        for (int i = 0; i < n; ++i) power.at(i, 0 + i) = 1;
+        for (int i = 0; i < n; ++i) power.at(i, i) = 1;
         ones.assign(static_cast<std::size_t>(n), weight);
         int q = 0;
         for (std::size_t t = 0; t < terms.size(); ++t) {
@@ -89,10 +116,7 @@ struct RunSolver {
                 multiply(ones, power, product);
                 std::swap(power, product);
             }
-            faces.assign(static_cast<std::size_t>(n), weight * terms[t].factor * c);
-            if (terms[t].diffusivity)
-                for (std::size_t i = 0; i + 1 < faces.size(); ++i)
-                    faces[i] *= 0.5 * (static_cast<double>(d[t][i]) + d[t][i + 1]);
+            find_faces(t);
             multiply(faces, power, product);
             for (int i = 0; i < n; ++i)
                 for (int j = product.first(i); j <= product.last(i); ++j) matrix.at(i, j) += product.at(i, j);

@@ -94,7 +94,7 @@ Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progres
     out.lines = {fmt::format("method      {}, {}", o.method, settings)};
     if (r.automatic) out.lines.push_back(fmt::format("noise       {}", noise_text(r.noise)));
     out.lines.push_back(fmt::format("time        {} ({}){}", steps_text(r), name_of(options.stepper),
-                                    r.automatic ? ": as long as the noise takes" : ""));
+                                    r.automatic ? ", until the noise is gone" : ""));
     out.history = fmt::format("{}, time {:.9g}{}, {} steps, dt {:.9g}, {}", settings, r.time,
                               r.automatic ? " (auto)" : "", r.steps, r.dt, name_of(options.stepper));
     return out;

@@ -1,7 +1,9 @@
+#include "vdbgeo/flow/baselines.h"
 #include "vdbgeo/flow/noise.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -55,6 +57,30 @@ TEST(Noise, IsZeroWhereNoVoxelHasAllNeighbours) {
     EXPECT_EQ(estimate_noise(*test::sparse_grid("row", 1)), 0);
     EXPECT_EQ(
         estimate_noise(*test::box_grid(test::box_of(Coord(0), 9, 9, 9), [](const Coord&) { return 5; })), 0);
+}
+
+/// White noise is removable as it is; what neighbours share of it is not seen by the finest band alone.
+TEST(Noise, OfNeighboursThatShareItIsSeenInTheSpread) {
+    const auto nothing = [](const Coord&) { return 0.0; };
+    const auto grid = noisy(2, nothing);
+    EXPECT_NEAR(density_spread(*grid), 2, 0.05);
+    EXPECT_EQ(removable_noise(*grid), estimate_noise(*grid));
+    gaussian_filter(*grid, 0.6);
+    const double white = estimate_noise(*grid), spread = density_spread(*grid);
+    ASSERT_GT(spread, 1.5 * white);
+    EXPECT_EQ(removable_noise(*grid), std::min(0.85 * spread, 2.5 * white));
+    // A smooth density is no noise, however much it varies.
+    const auto wave = noisy(0.001, [](const Coord& c) { return std::sin(0.1 * c.x()); });
+    EXPECT_LE(removable_noise(*wave), 2.5 * estimate_noise(*wave));
+    EXPECT_LT(removable_noise(*wave), 0.02);
+}
+
+TEST(Noise, LeavesOutWhatIsConstant) {
+    const auto half = noisy(1, [](const Coord&) { return 0.0; });
+    const double all = estimate_noise(*half);
+    for (auto it = half->beginValueOn(); it; ++it)
+        if (it.getCoord().x() > 8) it.setValue(3);
+    EXPECT_NEAR(estimate_noise(*half), all, 0.1);
 }
 
 TEST(Noise, CountsTheVoxelsOfActiveTiles) {

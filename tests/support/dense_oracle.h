@@ -194,7 +194,7 @@ class Oracle {
         const Values l = power(input_, 1);
         Values inside;
         for (std::size_t i = 0; i < size(); ++i)
-            if (std::find(near_[i].begin(), near_[i].end(), none) == near_[i].end())
+            if (std::find(near_[i].begin(), near_[i].end(), none) == near_[i].end() && l[i] != 0)
                 inside.push_back(std::abs(l[i]));
         if (inside.empty()) return 0;
         std::sort(inside.begin(), inside.end());

@@ -58,7 +58,10 @@ class UntilNoiseIsGone {
             // The first cycle turns the finest noise over a little: that it removes more than there is says
             // nothing.
             if (now >= noise_ * (k == 0 ? 1 + turned : 1)) {
-                if (now > (1 + tolerance) * noise_) go_back(time, removed, now, report, progress);
+                if (removed > noise_)  // the first cycle had been too long after all
+                    go_back(0, 0, time, removed, report, progress);
+                else if (now > (1 + tolerance) * noise_)
+                    go_back(time, removed, report.time, now, report, progress);
                 return;
             }
             time = report.time;
@@ -77,24 +80,28 @@ class UntilNoiseIsGone {
                                   std::min(1.0, (report.steps + cycle.n) / double(most_steps))));
     }
 
-    /// Between (time, removed) and (report.time, now) what is removed goes about with the logarithm of the
-    /// time. From nothing on, with the square root of it.
-    void go_back(double time, double removed, double now, HyperdiffusionReport& report,
+    /// Once more, to where `noise_` is removed, given what was by two times: that goes about with the logarithm of
+    /// the time; from nothing on, with its square root.
+    void go_back(double time, double removed, double later, double removed_later, HyperdiffusionReport& report,
                  const Progress& progress) {
-        const double share = (noise_ - removed) / (now - removed);
-        const double until =
-            time > 0 ? time * std::pow(report.time / time, share) : report.time * share * share;
-        cycles_.pop_back();
-        const std::vector<CycleRun> again = cycles_;
-        const bool first = again.empty();
+        const double share = (noise_ - removed) / (removed_later - removed);
+        const double until = time > 0 ? time * std::pow(later / time, share) : later * share * share;
+        std::vector<CycleRun> again;
+        double all = 0;
+        for (const CycleRun& c : cycles_) {
+            const double more = cycle_time(Stepper::fsi, c.n, c.tau);
+            if (all + more > time * (1 + 1e-9)) break;
+            all += more;
+            again.push_back(c);
+        }
+        const int least = again.empty() ? options_.min_cycles : 1;
+        for (const CycleRun& c :
+             cycles_for_time(Stepper::fsi, until - all, largest_, {highest_order(options_), 300, least}))
+            again.push_back(c);
         report.steps = report.cycles = 0;
         report.time = 0;
         solver_.reset();
         solver_.run(Stepper::fsi, again, report, progress);
-        solver_.run(Stepper::fsi,
-                    cycles_for_time(Stepper::fsi, until - report.time, largest_,
-                                    {highest_order(options_), 300, first ? options_.min_cycles : 1}),
-                    report, progress);
     }
 
     DiffusionSolver& solver_;

@@ -150,12 +150,12 @@ std::vector<CLI::Option*> DiffusionFlags::add(CLI::App& app) {
     sigma.add(app, options.sigma);
     add(app.get_option("--sigma"));
     add(app.add_option("--time", time,
-                       "How long to diffuse: a number, or auto: as long as the noise takes [auto]"));
+                       "How long to diffuse: a number, or auto: until the noise is gone [auto]"));
     add(app.add_option("--steps", options.steps, "Number of steps, instead of --time"));
     add(app.add_option("--dt", options.dt, "Step in time; at most the bound for stability [0.9 of it]"));
     add_stepper(app, options.stepper);
     add(app.get_option("--stepper"));
-    add(app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 200")
+    add(app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
             ->capture_default_str());
     add(app.add_option("--min-cycles", options.min_cycles, "Times that the coefficients are found, at least")
             ->capture_default_str());
@@ -192,7 +192,7 @@ void HighPassFlags::add(CLI::App& app) {
     app.add_option("--time", options.time, "How long to diffuse")->capture_default_str();
     app.add_option("--dt", options.dt, "Step in time; at most the bound for stability [0.9 of it]");
     add_stepper(app, options.stepper);
-    app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 200")
+    app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
         ->capture_default_str();
 }
 

@@ -23,7 +23,7 @@ TEST_F(Denoise, AloneChoosesAndSaysWhatItChose) {
     const Ended r = good({"denoise", map, at("b.mrc")});
     for (const char* text :
          {"method      hyperdiffusion, order ", "sigma local", "noise       ", "time        ",
-          "as long as the noise takes", "removed     ", "voxels      64000"})
+          "until the noise is gone", "removed     ", "voxels      64000"})
         EXPECT_NE(r.out.find(text), std::string::npos) << text << "\n" << r.out;
     const Json j = json({"denoise", map, at("b.mrc")});
     expect_keys(j, keys_of_diffusion);

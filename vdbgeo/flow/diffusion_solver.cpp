@@ -125,11 +125,11 @@ double DiffusionSolver::bound() const {
 }
 
 double DiffusionSolver::step(Stepper stepper, const std::optional<double>& dt) const {
-    constexpr double safety = 0.9, longer = 20;
-    if (stepper == Stepper::adi) return dt.value_or(longer * safety * bound());
-    if (dt && *dt > bound())
-        throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, bound()));
-    return dt.value_or(safety * bound());
+    constexpr double safety = 0.9, implicit = 20;
+    const double largest = stepper == Stepper::adi ? implicit * bound() : bound();
+    if (dt && *dt > largest)
+        throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, largest));
+    return dt.value_or(safety * largest);
 }
 
 void DiffusionSolver::freeze(std::size_t field) {

@@ -47,8 +47,8 @@ class DiffusionSolver {
 
     /// Explicit steps are stable up to this.
     double bound() const;
-    /// The step to use: dt, or 0.9 of the bound, or for ADI, which has none, 20 times as much. InvalidInput
-    /// for a dt above the bound.
+    /// The step to use: dt, or 0.9 of the largest allowed, which is the bound, and 20 times it for ADI (see
+    /// implicit_step). InvalidInput for a dt above that.
     double step(Stepper stepper, const std::optional<double>& dt) const;
     /// Evaluates the coefficients and takes n steps: FSI's, n times α = 1, or n semi-implicit ones. Checks
     /// that the values are finite and that their mean stays where it was; NumericalError.

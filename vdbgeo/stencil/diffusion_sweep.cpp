@@ -3,7 +3,6 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -213,7 +212,6 @@ ShiftedField::ShiftedField(const BlockLayout& layout) {
 }
 
 int steps_per_sweep(int max_order) {
-    if (const char* e = std::getenv("VDBGEO_S")) return std::atoi(e);
     switch (max_order) {
         case 0:
             return 8;

@@ -98,9 +98,9 @@ void for_each_tile(const BlockLayout& layout, const TileFields& fields,
     const Shape shape(fields.halo);
     tbb::enumerable_thread_specific<Arrays> arrays([&] { return Arrays(shape, fields); });
     std::atomic<std::size_t> done{0};
-    const std::size_t cells = layout.cells().size();
+    const std::size_t cells = (layout.cells().size() + fields.every - 1) / fields.every;
     parallel_for(cells, 1, [&](std::size_t i) {
-        run_tile(layout, static_cast<std::int32_t>(i), shape, fields, body, arrays.local());
+        run_tile(layout, static_cast<std::int32_t>(i * fields.every), shape, fields, body, arrays.local());
         progress.report(static_cast<double>(++done) / static_cast<double>(cells));
     });
 }

@@ -37,6 +37,7 @@ struct TileFields {
     std::vector<float*> out;       ///< bricks; another memory than `in`
     int halo = 1;                  ///< 0…16
     int scratch = 0;               ///< how many arrays to work in
+    std::size_t every = 1;         ///< only each such cell: a sample, where nothing is written
 };
 
 /// Runs body(tile) for every cell, in parallel; each thread has its own arrays. (32+2h)² (128+2h') floats an

@@ -155,7 +155,8 @@ std::vector<CLI::Option*> DiffusionFlags::add(CLI::App& app) {
     add(app.add_option("--dt", options.dt, "Step in time; at most the bound for stability [0.9 of it]"));
     add_stepper(app, options.stepper);
     add(app.get_option("--stepper"));
-    add(app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
+    add(app.add_option("--cycle", options.cycle,
+                       "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
             ->capture_default_str());
     add(app.add_option("--min-cycles", options.min_cycles, "Times that the coefficients are found, at least")
             ->capture_default_str());
@@ -192,7 +193,8 @@ void HighPassFlags::add(CLI::App& app) {
     app.add_option("--time", options.time, "How long to diffuse")->capture_default_str();
     app.add_option("--dt", options.dt, "Step in time; at most the bound for stability [0.9 of it]");
     add_stepper(app, options.stepper);
-    app.add_option("--cycle", options.cycle, "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
+    app.add_option("--cycle", options.cycle,
+                   "Steps with the same coefficients, at most, 1 to 300; unset: they grow")
         ->capture_default_str();
 }
 

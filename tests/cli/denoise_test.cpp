@@ -21,9 +21,8 @@ const Words keys_of_diffusion{"method",  "order",         "diffusivity", "sigma"
 TEST_F(Denoise, AloneChoosesAndSaysWhatItChose) {
     const std::string map = noisy("a.mrc", 40);
     const Ended r = good({"denoise", map, at("b.mrc")});
-    for (const char* text :
-         {"method      hyperdiffusion, order ", "sigma local", "noise       ", "time        ",
-          "until the noise is gone", "removed     ", "voxels      64000"})
+    for (const char* text : {"method      hyperdiffusion, order ", "sigma global", "noise       ",
+                             "time        ", "until the noise is gone", "removed     ", "voxels      64000"})
         EXPECT_NE(r.out.find(text), std::string::npos) << text << "\n" << r.out;
     const Json j = json({"denoise", map, at("b.mrc")});
     expect_keys(j, keys_of_diffusion);
@@ -98,7 +97,7 @@ TEST_F(Denoise, TheGridRemembersWhatWasDone) {
     const std::string map = noisy("a.mrc", 20);
     good({"denoise", map, at("b.vdb"), "--order", "1", "--time", "0.25", "--quiet"});
     const std::string all = json({"info", at("b.vdb")}).dump();
-    for (const char* text : {"denoised: hyperdiffusion", "order 1", "time 0.25", "sigma local"})
+    for (const char* text : {"denoised: hyperdiffusion", "order 1", "time 0.25", "sigma global"})
         EXPECT_NE(all.find(text), std::string::npos) << text << "\n" << all;
     // Through VDB or not, the samples are the same.
     good({"denoise", map, at("c.mrc"), "--order", "1", "--time", "0.25", "--quiet"});
@@ -206,7 +205,7 @@ TEST_F(Denoise, NonsenseIsTwo) {
 TEST_F(Denoise, AStepAboveTheBoundIsThree) {
     const std::string map = phantom("a.mrc", 16);
     const Ended r = vdbgeo({"denoise", map, at("b.mrc"), "--steps", "3", "--dt", "0.5", "--quiet"});
-    expect_error(r, 3, map + ": ", "0.166");  // 2/12
+    expect_error(r, 3, map + ": ", "0.0138889");  // 2/12²
     EXPECT_FALSE(listing().count("b.mrc"));
 }
 

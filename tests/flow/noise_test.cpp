@@ -1,4 +1,3 @@
-#include "vdbgeo/flow/baselines.h"
 #include "vdbgeo/flow/noise.h"
 
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include "tests/support/dense_oracle.h"
 #include "tests/support/grids.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/baselines.h"
 
 namespace vdbgeo {
 namespace {

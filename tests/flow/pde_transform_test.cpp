@@ -1,4 +1,3 @@
-#include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/pde_transform.h"
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include "tests/support/dense_oracle.h"
 #include "tests/support/grids.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/diffusion_solver.h"
 
 namespace vdbgeo {
 namespace {

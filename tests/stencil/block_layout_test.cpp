@@ -20,7 +20,8 @@ using stencil::BlockLayout;
 int floored(int a, int b) { return static_cast<int>(std::floor(static_cast<double>(a) / b)); }
 
 Coord cell_origin(const Coord& c) {
-    return {floored(c.x(), 32) * 32, floored(c.y(), 32) * 32, floored(c.z(), BlockLayout::size_z) * BlockLayout::size_z};
+    return {floored(c.x(), 32) * 32, floored(c.y(), 32) * 32,
+            floored(c.z(), BlockLayout::size_z) * BlockLayout::size_z};
 }
 
 class LayoutOf : public testing::TestWithParam<std::string> {};

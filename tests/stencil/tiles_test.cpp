@@ -45,7 +45,8 @@ TEST_P(TilesOf, HoldWhatTheGridHolds) {
                         bad += t.active[t.at(x, y, z)] != (on ? 1.0f : 0.0f);
                         bad += on && (z < span.begin || z >= span.end);
                     }
-                    bad += span.begin < span.end && (span.begin < -halo || span.end > BlockLayout::size_z + halo);
+                    bad += span.begin < span.end &&
+                           (span.begin < -halo || span.end > BlockLayout::size_z + halo);
                 }
             wrong += bad;
             ++tiles;
@@ -67,7 +68,8 @@ TEST_P(TilesOf, WriteBackTheirOwnVoxels) {
     stencil::for_each_tile(layout, {{field.brick(0)}, {sum.brick(0), copy.brick(0)}, 1, 1}, [&](Tile& t) {
         for (int x = -1; x < 33; ++x)
             for (int y = -1; y < 33; ++y)
-                for (int z = -1; z < BlockLayout::size_z + 1; ++z) t.scratch[0][t.at(x, y, z)] = t.in[0][t.at(x, y, z)];
+                for (int z = -1; z < BlockLayout::size_z + 1; ++z)
+                    t.scratch[0][t.at(x, y, z)] = t.in[0][t.at(x, y, z)];
         for (int x = 0; x < 32; ++x)
             for (int y = 0; y < 32; ++y)
                 for (int z = 0; z < BlockLayout::size_z; ++z) {

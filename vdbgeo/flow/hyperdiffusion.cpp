@@ -46,13 +46,16 @@ std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
 class UntilNoiseIsGone {
  public:
     UntilNoiseIsGone(DiffusionSolver& solver, const HyperdiffusionOptions& o, double largest, double noise)
-        : solver_(solver), options_(o), largest_(largest), noise_(noise) {}
+        : solver_(solver),
+          options_(o),
+          largest_(largest),
+          noise_(noise),
+          most_steps_(solver.active_voxels() > large ? 150 : 320) {}
 
     void run(HyperdiffusionReport& report, const Progress& progress) {
-        int n = growing_cycle(highest_order(options_), 0);
+        int n = next_cycle(0);
         double time = 0, removed = 0;
-        for (int k = 0; cycles_.empty() || report.steps < most_steps; ++k) {
-            if (k > 0) n = std::min(options_.cycle.value_or(300), growing_cycle(highest_order(options_), k));
+        for (int k = 0; cycles_.empty() || report.steps + n <= most_steps_; ++k) {
             take({1, n, largest_}, report, progress);
             const double now = solver_.removed();
             // The first cycle turns the finest noise over a little: that it removes more than there is says
@@ -66,24 +69,30 @@ class UntilNoiseIsGone {
             }
             time = report.time;
             removed = now;
+            n = next_cycle(k + 1);
         }
     }
 
  private:
-    static constexpr int most_steps = 300;
+    /// Beyond this many voxels patience counts more than the last tenth of a dB.
+    static constexpr std::uint64_t large = 64000000;
     static constexpr double tolerance = 0.01, turned = 0.1;
 
+    int next_cycle(int k) const {
+        const int n = growing_cycle(highest_order(options_), k);
+        return options_.cycle ? std::min(*options_.cycle, n) : n;
+    }
     void take(const CycleRun& cycle, HyperdiffusionReport& report, const Progress& progress) {
         cycles_.push_back(cycle);
         solver_.run(Stepper::fsi, std::vector<CycleRun>{cycle}, report,
-                    progress.part(std::min(1.0, report.steps / double(most_steps)),
-                                  std::min(1.0, (report.steps + cycle.n) / double(most_steps))));
+                    progress.part(std::min(1.0, report.steps / double(most_steps_)),
+                                  std::min(1.0, (report.steps + cycle.n) / double(most_steps_))));
     }
 
-    /// Once more, to where `noise_` is removed, given what was by two times: that goes about with the logarithm of
-    /// the time; from nothing on, with its square root.
-    void go_back(double time, double removed, double later, double removed_later, HyperdiffusionReport& report,
-                 const Progress& progress) {
+    /// Once more, to where `noise_` is removed, given what was by two times: that goes about with the
+    /// logarithm of the time; from nothing on, with its square root.
+    void go_back(double time, double removed, double later, double removed_later,
+                 HyperdiffusionReport& report, const Progress& progress) {
         const double share = (noise_ - removed) / (removed_later - removed);
         const double until = time > 0 ? time * std::pow(later / time, share) : later * share * share;
         std::vector<CycleRun> again;
@@ -107,6 +116,7 @@ class UntilNoiseIsGone {
     DiffusionSolver& solver_;
     const HyperdiffusionOptions& options_;
     double largest_, noise_;
+    int most_steps_;
     std::vector<CycleRun> cycles_;
 };
 

@@ -40,7 +40,8 @@ std::size_t band_of(const Tile& t, int spacing, float* out) {
 double noise_of(const openvdb::FloatTree& tree, int spacing) {
     constexpr double to_deviation = 1.4826;  // of a median absolute value, for a normal distribution
     constexpr double stencil_norm = 42;      // 6² + 6 · 1²
-    constexpr std::size_t cell = std::size_t(1) * BlockLayout::size_x * BlockLayout::size_y * BlockLayout::size_z;
+    constexpr std::size_t cell =
+        std::size_t(1) * BlockLayout::size_x * BlockLayout::size_y * BlockLayout::size_z;
     constexpr std::size_t sample = 8000000;
     const BlockLayout layout(tree);
     BlockField field(layout.brick_count());

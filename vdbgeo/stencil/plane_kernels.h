@@ -73,7 +73,7 @@ struct Kernels {
     void (*window_sum)(std::size_t n, int r, const float* in, bool squared, double* out);
     /// out[i] = Σ_k in[k][i] for k in [0, count).
     void (*sum_rows)(std::size_t n, int count, const double* const* in, double* out);
-    /// variance = max(floor, factor (square/count − Σ_c (sums_c/count)²)), of `components` sums.
+    /// variance = max(floor, factor (square/count − Σ_c (sums_c/count)²)), of one or three `components`.
     void (*variance)(std::size_t n, const double* count, const double* square, const double* const* sums,
                      int components, float factor, float floor, float* variance);
     /// out = d0 exp(−gradient2 / (2 variance)) where active, `inactive` elsewhere.

@@ -254,18 +254,25 @@ void gradient(const PlaneRange& range, const Planes& u, const Planes& active, co
 }
 
 template <bool squared>
+inline double term(float v) {
+    const double d = v;
+    return squared ? d * d : d;
+}
+
+template <bool squared>
 void window_sum_of(std::size_t n, int r, const float* __restrict in, double* __restrict out) {
-    for (std::size_t block = 0; block < n; block += lanes) {
-        double sum[lanes] = {};
-        for (int k = -r; k <= r; ++k) {
-            const float* const from = in + static_cast<std::ptrdiff_t>(block) + k;
-            for (int i = 0; i < lanes; ++i) {
-                const double v = from[i];
-                sum[i] += squared ? v * v : v;
-            }
+    if (r == 2) {  // the default, in one pass
+        for (std::size_t i = 0; i < n; ++i) {
+            const float* const at = in + i;
+            out[i] = (((term<squared>(at[-2]) + term<squared>(at[-1])) + term<squared>(at[0])) +
+                      term<squared>(at[1])) +
+                     term<squared>(at[2]);
         }
-        for (int i = 0; i < lanes; ++i) out[block + static_cast<std::size_t>(i)] = sum[i];
+        return;
     }
+    for (std::size_t i = 0; i < n; ++i) out[i] = term<squared>(in[static_cast<std::ptrdiff_t>(i) - r]);
+    for (int k = 1 - r; k <= r; ++k)
+        for (std::size_t i = 0; i < n; ++i) out[i] += term<squared>(in[static_cast<std::ptrdiff_t>(i) + k]);
 }
 
 void window_sum(std::size_t n, int r, const float* in, bool squared, double* out) {
@@ -276,27 +283,37 @@ void window_sum(std::size_t n, int r, const float* in, bool squared, double* out
 }
 
 void sum_rows(std::size_t n, int count, const double* const* in, double* __restrict out) {
-    for (std::size_t block = 0; block < n; block += lanes) {
-        double sum[lanes] = {};
-        for (int k = 0; k < count; ++k)
-            for (int i = 0; i < lanes; ++i) sum[i] += in[k][block + static_cast<std::size_t>(i)];
-        for (int i = 0; i < lanes; ++i) out[block + static_cast<std::size_t>(i)] = sum[i];
+    if (count == 5) {
+        const double *const a = in[0], *const b = in[1], *const c = in[2], *const d = in[3], *const e = in[4];
+        for (std::size_t i = 0; i < n; ++i) out[i] = (((a[i] + b[i]) + c[i]) + d[i]) + e[i];
+        return;
     }
+    for (std::size_t i = 0; i < n; ++i) out[i] = in[0][i];
+    for (int k = 1; k < count; ++k) {
+        const double* __restrict const row = in[k];
+        for (std::size_t i = 0; i < n; ++i) out[i] += row[i];
+    }
+}
+
+inline float variance_of(double count, double square, double means, float factor, float floor) {
+    const double one = 1.0 / (count > 0.5 ? count : 1.0);
+    const float v = factor * static_cast<float>((square - means * one) * one);
+    return v > floor ? v : floor;
 }
 
 void variance(std::size_t n, const double* __restrict count, const double* __restrict square,
               const double* const* sums, int components, float factor, float floor,
               float* __restrict result) {
-    const double *const s0 = sums[0], *const s1 = components > 1 ? sums[1] : nullptr,
-                        *const s2 = components > 2 ? sums[2] : nullptr;
-    for (std::size_t i = 0; i < n; ++i) {
-        const double one = 1.0 / (count[i] > 0.5 ? count[i] : 1.0);
-        double means = s0[i] * s0[i];
-        if (s1) means += s1[i] * s1[i];
-        if (s2) means += s2[i] * s2[i];
-        const float v = factor * static_cast<float>((square[i] - means * one) * one);
-        result[i] = v > floor ? v : floor;
+    const double* __restrict const a = sums[0];
+    if (components == 1) {
+        for (std::size_t i = 0; i < n; ++i)
+            result[i] = variance_of(count[i], square[i], a[i] * a[i], factor, floor);
+        return;
     }
+    const double* __restrict const b = sums[1], * __restrict const c = sums[2];
+    for (std::size_t i = 0; i < n; ++i)
+        result[i] =
+            variance_of(count[i], square[i], (a[i] * a[i] + b[i] * b[i]) + c[i] * c[i], factor, floor);
 }
 
 }  // namespace

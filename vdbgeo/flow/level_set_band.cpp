@@ -103,32 +103,38 @@ class NearestPoint {
     }
 
     /// The nearest place where φ, taken as linear, changes sign along an edge between neighbouring voxels.
+    /// Goes outward shell by shell, and ends where no further shell can hold a nearer one.
     Nearest nearest_crossing(int x, int y, int z) const {
-        const Vec3d from(x, y, z);
         const int r = half_width_ + 2;
-        const std::ptrdiff_t strides[3] = {phi_.stride_x, phi_.stride_y, 1};
         Nearest out;
         double best = r * r;
-        for (int i = -r; i <= r; ++i)
-            for (int j = -r; j <= r; ++j)
-                for (int k = -r; k <= r; ++k) {
-                    const int q[3] = {x + i, y + j, z + k};
-                    const float* at = phi_.at(q[0], q[1], q[2]);
-                    for (int a = 0; a < 3; ++a) {
-                        const float b = at[strides[a]];
-                        if (std::isnan(*at) || std::isnan(b) || (*at < 0) == (b < 0)) continue;
-                        Vec3d p(q[0], q[1], q[2]);
-                        p[a] += static_cast<double>(*at) / (static_cast<double>(*at) - b);
-                        const double d2 = (p - from).squaredNorm();
-                        if (d2 >= best) continue;
-                        best = d2;
-                        out.found = true;
-                        out.distance = std::sqrt(d2);
-                        out.normal = (from - p) / std::max(out.distance, 1e-6);
-                    }
+        for (int shell = 0; shell <= r && (shell < 2 || (shell - 1) * (shell - 1) < best); ++shell)
+            for (int i = -shell; i <= shell; ++i)
+                for (int j = -shell; j <= shell; ++j) {
+                    const bool side = std::abs(i) == shell || std::abs(j) == shell;
+                    for (int k = -shell; k <= shell; k += side || shell == 0 ? 1 : 2 * shell)
+                        take_crossings({x, y, z}, {x + i, y + j, z + k}, best, out);
                 }
         if (*phi_.at(x, y, z) < 0) out.normal = -out.normal;
         return out;
+    }
+    /// The crossings of the three edges from voxel q on, where they are nearer to `from` than √best.
+    void take_crossings(const Vec3i& from, const Vec3i& q, double& best, Nearest& out) const {
+        const std::ptrdiff_t strides[3] = {phi_.stride_x, phi_.stride_y, 1};
+        const float* at = phi_.at(q[0], q[1], q[2]);
+        for (int a = 0; a < 3; ++a) {
+            const float b = at[strides[a]];
+            if (std::isnan(*at) || std::isnan(b) || (*at < 0) == (b < 0)) continue;
+            Vec3d p = q.cast<double>();
+            p[a] += static_cast<double>(*at) / (static_cast<double>(*at) - b);
+            const Vec3d gap = from.cast<double>() - p;
+            const double d2 = gap.squaredNorm();
+            if (d2 >= best) continue;
+            best = d2;
+            out.found = true;
+            out.distance = std::sqrt(d2);
+            out.normal = gap / std::max(out.distance, 1e-6);
+        }
     }
 
     const DenseWindow& phi_;
@@ -166,8 +172,8 @@ DenseWindow window_of(const Tile& t, std::size_t field, std::size_t scratch) {
             {BlockLayout::size_x + h - 1, BlockLayout::size_y + h - 1, BlockLayout::size_z + h - 1}};
 }
 
-SurfaceBand::SurfaceBand(const FloatGrid& level_set, int half_width)
-    : half_width_(half_width), tree_(std::make_shared<FloatTree>(level_set.tree())) {
+SurfaceBand::SurfaceBand(const FloatGrid& level_set, int half_width, const Progress& progress)
+    : progress_(progress), half_width_(half_width), tree_(std::make_shared<FloatTree>(level_set.tree())) {
     const auto scale = static_cast<float>(1 / level_set.voxelSize()[0]);
     tree_->voxelizeActiveTiles();
     openvdb::tree::NodeManager<FloatTree> nodes(*tree_);
@@ -216,18 +222,21 @@ void SurfaceBand::redistance() {
     fields.out = {phi_.brick(0), normal_[0].brick(0), normal_[1].brick(0), normal_[2].brick(0)};
     fields.halo = halo();
     fields.scratch = 1;
-    stencil::for_each_tile(layout_, fields, [&](Tile& t) {
-        const DenseWindow phi = window_of(t, 0, 0);
-        const NearestPoint search(phi, half_width_);
-        for_active(t, [&](int x, int y, int z, std::ptrdiff_t at) {
-            const Nearest nearest = search.find(x, y, z);
-            const double d = nearest.found ? nearest.distance : half_width_ + 2;
-            t.out[0][at] = static_cast<float>(phi.data[at] < 0 ? -d : d);
-            for (std::size_t a = 0; a < 3; ++a)
-                t.out[a + 1][at] = static_cast<float>(nearest.normal[static_cast<int>(a)]);
-            if (nearest.found) any = true;
-        });
-    });
+    stencil::for_each_tile(
+        layout_, fields,
+        [&](Tile& t) {
+            const DenseWindow phi = window_of(t, 0, 0);
+            const NearestPoint search(phi, half_width_);
+            for_active(t, [&](int x, int y, int z, std::ptrdiff_t at) {
+                const Nearest nearest = search.find(x, y, z);
+                const double d = nearest.found ? nearest.distance : half_width_ + 2;
+                t.out[0][at] = static_cast<float>(phi.data[at] < 0 ? -d : d);
+                for (std::size_t a = 0; a < 3; ++a)
+                    t.out[a + 1][at] = static_cast<float>(nearest.normal[static_cast<int>(a)]);
+                if (nearest.found) any = true;
+            });
+        },
+        progress_);
     vanished_ = !any;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include "vdbgeo/core/progress.h"
 #include "vdbgeo/flow/interpolate.h"
 #include "vdbgeo/stencil/tiles.h"
 
@@ -18,7 +19,7 @@ class SurfaceBand {
     static constexpr int min_half_width = 6, max_half_width = 20;
 
     /// Takes a level set with cubic voxels whose band may be narrower.
-    SurfaceBand(const openvdb::FloatGrid& level_set, int half_width);
+    SurfaceBand(const openvdb::FloatGrid& level_set, int half_width, const Progress& progress = {});
 
     /// Moves the band to where the zero level is now, and makes φ the distance to it: for each voxel the
     /// nearest point of the zero level of the interpolant of order 6, found by Newton's method along the
@@ -27,6 +28,8 @@ class SurfaceBand {
     /// voxel since the last time.
     void rebuild();
 
+    /// Who is asked, while distances are found, whether to go on.
+    void watch(const Progress& progress) { progress_ = progress; }
     bool vanished() const { return vanished_; }
     const stencil::BlockLayout& layout() const { return layout_; }
     const float* phi() const { return phi_.brick(0); }
@@ -55,6 +58,7 @@ class SurfaceBand {
     void count_inside();
     void redistance();
 
+    Progress progress_;
     int half_width_;
     bool vanished_ = false;
     openvdb::FloatTree::Ptr tree_;

@@ -151,7 +151,8 @@ LevelSetFlowReport level_set_flow(FloatGrid& grid, const LevelSetFlowOptions& op
     const int out =
         std::min(options.half_width > 0 ? options.half_width : given, SurfaceBand::max_half_width);
     SurfaceBand band(
-        grid, std::max({out, std::min(given, SurfaceBand::max_half_width), SurfaceBand::min_half_width}));
+        grid, std::max({out, std::min(given, SurfaceBand::max_half_width), SurfaceBand::min_half_width}),
+        progress.part(0, 0));
     report.volume_before = report.volume_after = band.measures().volume;
     report.active_voxels = grid.activeVoxelCount();
     report.vanished = band.vanished();
@@ -160,6 +161,8 @@ LevelSetFlowReport level_set_flow(FloatGrid& grid, const LevelSetFlowOptions& op
     Steps steps(band, options);
     const double rounding = 1e-9 * options.time;
     while (!band.vanished() && options.time - report.time > rounding) {
+        const double done = report.time / options.time;
+        band.watch(progress.part(done, done));
         const double dt = steps.step(options.time - report.time);
         report.time += dt;
         report.dt = std::max(report.dt, dt);

@@ -552,6 +552,25 @@ TEST(Hyperdiffusion, TakesItsTimeFromTheNoise) {
     EXPECT_LT(error(), 0.5);
 }
 
+/// Little noise on a structure that the first cycle would blur: the time is taken back to where the noise is
+/// gone.
+TEST(Hyperdiffusion, ATimeThatWasTooLongIsTakenBack) {
+    test::SparseMaker random(16);
+    const auto grid = test::box_grid(test::box_of(Coord(-10), 40, 40, 40), [&](const Coord& c) {
+        return std::sin(0.9 * c.x()) * std::cos(0.8 * c.y()) + 0.02 * (random.uniform() - 0.5);
+    });
+    HyperdiffusionOptions once;
+    once.steps = 21;
+    once.cycle = 21;
+    once.min_cycles = 1;
+    const HyperdiffusionReport first = hyperdiffuse(*grid->deepCopy(), once);
+    const HyperdiffusionReport chosen = hyperdiffuse(*grid, {});
+    ASSERT_GT(first.removed, 1.2 * chosen.noise);
+    EXPECT_GT(chosen.time, 0);
+    EXPECT_LT(chosen.time, first.time);
+    EXPECT_LT(chosen.removed, first.removed);
+}
+
 // ------------------------------------------------------------------------------------------ small things
 
 TEST(AxisWeights, AreTheSquaredRatiosOfTheVoxelSizes) {

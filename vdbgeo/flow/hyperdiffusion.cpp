@@ -104,8 +104,8 @@ class UntilNoiseIsGone {
             again.push_back(c);
         }
         const int least = again.empty() ? options_.min_cycles : 1;
-        for (const CycleRun& c :
-             cycles_for_time(Stepper::fsi, until - all, largest_, {highest_order(options_), 300, least}))
+        const CycleRule rule{highest_order(options_), options_.cycle.value_or(300), least};
+        for (const CycleRun& c : cycles_for_time(Stepper::fsi, until - all, largest_, rule))
             again.push_back(c);
         report.steps = report.cycles = 0;
         report.time = 0;

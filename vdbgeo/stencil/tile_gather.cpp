@@ -66,11 +66,9 @@ void TileGather::move_to(int x) {
         find_bricks(layer, bricks_);
     find_bricks(layer + 1, next_bricks_);
     layer_ = layer;
-    leaves_here_ = 0;
     regular_ = true;
     for (int i = 0; i < count; ++i) {
         if (bricks_[i] == BlockLayout::none) continue;
-        ++leaves_here_;
         regular_ = regular_ && layout_.full(static_cast<std::size_t>(bricks_[i]));
     }
     spans_known_ = false;

@@ -31,8 +31,6 @@ class TileGather {
     const openvdb::Coord& origin() const { return origin_; }
 
     void move_to(int x);
-    /// True where no voxel of the plane is active, halo included.
-    bool empty() const { return leaves_here_ == 0; }
     /// The plane of a field; `absent` where there is no leaf, or what the plane had there.
     void copy(const float* bricks, std::optional<float> absent, float* plane) const;
     /// `on` where voxels are active, `off` elsewhere.
@@ -60,7 +58,7 @@ class TileGather {
     std::ptrdiff_t stride_;
     openvdb::Coord origin_;
     Part y_[BlockLayout::leaves_y + 2 * most], z_[BlockLayout::leaves_z + 2 * most];
-    int y_count_, z_count_, leaves_here_ = 0;
+    int y_count_, z_count_;
     /// Every leaf of the layer is full or missing: its planes have the same spans.
     bool regular_ = false, spans_known_ = false;
     std::array<RowSpan, BlockLayout::size_y + 2 * BlockLayout::max_halo> regular_spans_;

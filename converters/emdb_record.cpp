@@ -1,0 +1,1 @@
+#include "converters/emdb_record.h"

@@ -1,0 +1,1 @@
+#include "converters/mesh_formats.h"

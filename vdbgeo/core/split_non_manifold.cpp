@@ -1,0 +1,1 @@
+#include "vdbgeo/core/split_non_manifold.h"

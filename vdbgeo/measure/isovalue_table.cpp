@@ -1,0 +1,1 @@
+#include "vdbgeo/measure/isovalue_table.h"

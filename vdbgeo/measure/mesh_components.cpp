@@ -1,0 +1,1 @@
+#include "vdbgeo/measure/mesh_components.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/measure/self_intersections.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/measure/surface_distance.h"

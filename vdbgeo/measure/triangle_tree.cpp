@@ -1,0 +1,1 @@
+#include "vdbgeo/measure/triangle_tree.h"

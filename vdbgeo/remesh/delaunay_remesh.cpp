@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/delaunay_remesh.h"

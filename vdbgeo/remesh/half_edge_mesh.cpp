@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/half_edge_mesh.h"

@@ -1,0 +1,3 @@
+// TriMesh to OpenMesh half-edges and back.
+#pragma once
+

@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/isotropic_remesh.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/mesh_diffusion.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/repair.h"

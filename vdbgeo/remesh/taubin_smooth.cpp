@@ -1,0 +1,1 @@
+#include "vdbgeo/remesh/taubin_smooth.h"

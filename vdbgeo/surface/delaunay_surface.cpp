@@ -1,0 +1,1 @@
+#include "vdbgeo/surface/delaunay_surface.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/surface/dual_surface.h"

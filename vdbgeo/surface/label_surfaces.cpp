@@ -1,0 +1,1 @@
+#include "vdbgeo/surface/label_surfaces.h"

@@ -1,0 +1,1 @@
+#include "vdbgeo/surface/trilinear_field.h"

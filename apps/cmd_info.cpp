@@ -4,15 +4,19 @@
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/reports.h"
+#include "apps/stages.h"
 #include "converters/mesh_file.h"
 #include "converters/strip_source.h"
+#include "vdbgeo/measure/isovalue_table.h"
+#include "vdbgeo/measure/self_intersections.h"
 
 namespace vdbgeo::app {
 namespace {
 
 struct InfoOptions {
     std::vector<std::string> files;
-    bool validate = false;
+    bool validate = false, isovalues = false;
+    std::string plot;
     MapFlags map;
 };
 
@@ -33,7 +37,12 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
         j["metadata"] = metadata;
     } else if (is_mesh_ending(file)) {
         j["kind"] = "mesh";
-        j.update(measures_json(measure_mesh(read_mesh(file, progress.part(0, 0.5)), progress.part(0.5, 1))));
+        const TriMesh mesh = read_mesh(file, progress.part(0, 0.3));
+        j.update(measures_json(measure_mesh(mesh, progress.part(0.3, 0.6))));
+        if (have_self_intersections()) {
+            const auto pairs = self_intersections(mesh, progress.part(0.6, 1));
+            j["self_intersections"] = pairs.size();
+        }
     } else {
         j["kind"] = "map";
         StripSource source(file, options.map.options, 1);
@@ -45,7 +54,45 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
     return j;
 }
 
+/// Isovalue → volume, area and pieces of the surface, as numbers, as lines and as a picture.
+Json isovalue_rows(const std::string& file, const InfoOptions& options, Session& session) {
+    const MapFile in = read_map(file, options.map.options, session.stage("reading"));
+    const auto rows = naming(file, [&] { return isovalue_table(in.map, {}, session.stage("surfaces")); });
+    session.end_stage();
+    Json table = Json::array();
+    if (!session.json)
+        session.say(fmt::format("{:>12} {:>8} {:>14} {:>14} {:>8}", "isovalue", "sigmas", "volume Å³",
+                                "area Å²", "pieces"));
+    const Statistics& s = in.map.statistics;
+    for (const IsovalueRow& row : rows) {
+        const double sigmas = s.rms > 0 ? (row.isovalue - s.mean) / s.rms : 0;
+        table.push_back({{"isovalue", row.isovalue},
+                         {"sigmas", sigmas},
+                         {"volume_A3", row.volume_A3},
+                         {"area_A2", row.area_A2},
+                         {"components", row.components}});
+        if (!session.json)
+            session.say(fmt::format("{:>12.5g} {:>8.3g} {:>14.6g} {:>14.6g} {:>8}", row.isovalue, sigmas,
+                                    row.volume_A3, row.area_A2, row.components));
+    }
+    if (!options.plot.empty()) plot_isovalues(rows, options.plot);
+    return table;
+}
+
+void check_info(const InfoOptions& options) {
+    if (!options.plot.empty() && !has_ending(options.plot, ".png"))
+        throw UsageError(fmt::format("{}: pictures are PNG files: .png", options.plot));
+    if (!options.isovalues && !options.plot.empty()) throw UsageError("--plot needs --isovalues");
+    if (!options.plot.empty() && options.files.size() > 1)
+        throw UsageError("--plot draws the isovalues of one map");
+    if (options.isovalues)
+        for (const std::string& file : options.files)
+            if (file == "-" || is_mesh_ending(file))
+                throw UsageError(fmt::format("{}: --isovalues is of maps and grids in files", file));
+}
+
 void run_info(const InfoOptions& options, Session& session) {
+    check_info(options);
     for (const std::string& file : options.files)
         if (file == "-" && options.validate)
             throw UsageError("-: --validate reads a file more than once, which a pipe does not allow");
@@ -56,8 +103,9 @@ void run_info(const InfoOptions& options, Session& session) {
             for (const std::string& line : as_lines(j)) session.say(line);
             if (options.validate && j.contains("departures") && j["departures"].empty())
                 session.say("departures from MRC2014: none");
-            if (file != options.files.back()) session.say("");
         }
+        if (options.isovalues) j["isovalues"] = isovalue_rows(file, options, session);
+        if (!session.json && file != options.files.back()) session.say("");
         all.push_back(std::move(j));
     }
     session.result(all.size() == 1 ? all[0] : Json{{"files", all}});
@@ -67,10 +115,15 @@ void run_info(const InfoOptions& options, Session& session) {
 
 Command info_command() {
     return {"info", "Header, statistics and topology of maps, grids and meshes",
-            "  vdbgeo info emd_1080.map --validate", [](CLI::App& app) {
+            "  vdbgeo info emd_1080.map --validate\n"
+            "  vdbgeo info emd_1080.map --isovalues --plot levels.png",
+            [](CLI::App& app) {
                 auto o = std::make_shared<InfoOptions>();
                 app.add_option("files", o->files, "Maps (MRC, CCP4), VDB grids or meshes")->required();
                 app.add_flag("--validate", o->validate, "List every departure of a map file from MRC2014");
+                app.add_flag("--isovalues", o->isovalues,
+                             "A table of a map: isovalue, enclosed volume, area and pieces of the surface");
+                app.add_option("--plot", o->plot, "Draw that table as a PNG here");
                 o->map.add_reading(app);
                 return [o](Session& session) {
                     o->map.finish();

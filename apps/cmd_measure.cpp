@@ -1,6 +1,8 @@
 // vdbgeo measure: numbers of a mesh.
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "apps/command.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
@@ -10,26 +12,40 @@ namespace vdbgeo::app {
 namespace {
 
 struct MeasureOptions {
-    std::string in, histogram;
+    std::vector<std::string> in;
+    std::string histogram;
 };
+
+Json measure_one(const std::string& file, MeshMeasures& measures, Session& session) {
+    Json seconds;
+    Clock clock;
+    const TriMesh mesh = read_mesh(file, session.stage("reading"));
+    seconds["read"] = clock.lap();
+    measures = measure_mesh(mesh, session.stage("measuring"));
+    seconds["compute"] = clock.lap();
+    session.end_stage();
+    Json j{{"file", file}};
+    j.update(measures_json(measures));
+    j["angle_histogram"] = measures.angle_histogram;
+    j["seconds"] = seconds;
+    return j;
+}
 
 void run_measure(const MeasureOptions& o, Session& session) {
     if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
         throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
-    Json seconds;
-    Clock clock;
-    const TriMesh mesh = read_mesh(o.in, session.stage("reading"));
-    seconds["read"] = clock.lap();
-    const MeshMeasures measures = measure_mesh(mesh, session.stage("measuring"));
-    seconds["compute"] = clock.lap();
-    session.end_stage();
-    Json j = measures_json(measures);
-    j["angle_histogram"] = measures.angle_histogram;
-    j["seconds"] = seconds;
-    if (!o.histogram.empty()) write_angle_histogram(measures, o.histogram);
-    if (!session.json)
-        for (const std::string& line : measures_text(measures)) session.say(line);
-    session.result(j);
+    Json all = Json::array();
+    std::vector<std::pair<std::string, MeshMeasures>> meshes;
+    for (const std::string& file : o.in) {
+        meshes.emplace_back(std::filesystem::path(file).filename().string(), MeshMeasures{});
+        all.push_back(measure_one(file, meshes.back().second, session));
+        if (session.json) continue;
+        if (o.in.size() > 1) session.say(file + ":");
+        for (const std::string& line : measures_text(meshes.back().second)) session.say(line);
+        if (file != o.in.back()) session.say("");
+    }
+    if (!o.histogram.empty()) write_angle_histograms(meshes, o.histogram);
+    session.result(all.size() == 1 ? all[0] : Json{{"files", all}});
 }
 
 }  // namespace
@@ -38,9 +54,11 @@ Command measure_command() {
     return {"measure", "Area, volume, components, genus, closedness and angles of a mesh",
             "  vdbgeo measure groel.ply --json", [](CLI::App& app) {
                 auto o = std::make_shared<MeasureOptions>();
-                app.add_option("mesh", o->in, "Mesh: .ply .obj .off .stl")->required();
-                app.add_option("--histogram", o->histogram,
-                               "Write the histogram of the triangles' angles as a PNG here");
+                app.add_option("meshes", o->in, "Meshes: " + mesh_endings_text())->required();
+                app.add_option(
+                    "--histogram", o->histogram,
+                    "Write the histogram of the triangles' angles as a PNG here, of several meshes as "
+                    "curves");
                 return [o](Session& session) { run_measure(*o, session); };
             }};
 }

@@ -1,61 +1,169 @@
-// vdbgeo surface: the surface of a map at an isovalue.
+// vdbgeo surface: the surface of a map at an isovalue, or the surfaces of a segmentation.
 #include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
 
 #include "apps/command.h"
 #include "apps/flags.h"
+#include "apps/mesh_command.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
+#include "vdbgeo/surface/label_surfaces.h"
 
 namespace vdbgeo::app {
 namespace {
 
 struct SurfaceOptions {
-    std::string in, out;
+    std::string in, out, labels;
+    bool split = false;
     MapFlags map;
     IsoFlag iso;
+    SurfaceFlags surface;
+    ComponentFlags components;
+    LabelSurfacesOptions label_options;
 };
 
+/// "all", or numbers with commas between them.
+std::vector<std::int64_t> parse_labels(const std::string& text) {
+    std::vector<std::int64_t> labels;
+    if (text == "all") return labels;
+    const char *at = text.data(), *end = text.data() + text.size();
+    for (bool more = true; more;) {
+        std::int64_t label = 0;
+        const auto [rest, error] = std::from_chars(at, end, label);
+        more = rest != end && *rest == ',';
+        if (error != std::errc() || (rest != end && !more))
+            throw UsageError(fmt::format("--labels: '{}' is neither all nor a list such as 1,2,5", text));
+        labels.push_back(label);
+        at = rest + 1;
+    }
+    return labels;
+}
+
+/// Drops pieces where asked; tells how many went.
+TriMesh keep_pieces(TriMesh mesh, const SurfaceOptions& o, Session& session) {
+    if (!o.components.any()) return mesh;
+    mesh = filter_components(mesh, o.components.filter, session.stage("pieces"));
+    if (mesh.empty())
+        throw NumericalError(fmt::format(
+            "{}: no piece of the surface is left; drop fewer (--keep-largest, --min-volume, --min-area)",
+            o.in));
+    return mesh;
+}
+
+void write_surface(const TriMesh& mesh, const SurfaceOptions& o, Json& j, Session& session) {
+    const Progress progress = session.stage("writing");
+    if (o.split)
+        j["files"] = write_pieces(mesh, o.out, progress);
+    else
+        write_mesh(mesh, o.out, {}, progress);
+    session.end_stage();
+}
+
+void finish(const TriMesh& mesh, const SurfaceOptions& o, Json head, Json seconds, Clock& clock,
+            Session& session) {
+    const MeshMeasures measures = measure_mesh(mesh, session.stage("measuring"));
+    seconds["compute"] = clock.lap();
+    Json j = measures_json(measures);
+    j.update(head);
+    write_surface(mesh, o, j, session);
+    seconds["write"] = clock.lap();
+    j["seconds"] = seconds;
+    if (!session.json)
+        for (const std::string& line : measures_text(measures)) session.say(line);
+    say_where_open(measures, session);
+    session.result(j);
+}
+
+/// All surfaces in one mesh, with the face property `label`.
+TriMesh join_labels(const std::vector<LabelSurface>& surfaces) {
+    TriMesh all;
+    MeshProperty label{"label", 1, {}};
+    for (const LabelSurface& s : surfaces) {
+        const auto first = static_cast<VertexId>(all.points.size());
+        all.points.insert(all.points.end(), s.mesh.points.begin(), s.mesh.points.end());
+        for (const Triangle& t : s.mesh.triangles)
+            all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+        label.values.resize(all.triangles.size(), static_cast<float>(s.label));
+    }
+    all.face_properties.push_back(std::move(label));
+    return all;
+}
+
+void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock& clock, Session& session) {
+    if (!is_label_map(in.map))
+        throw InvalidInput(fmt::format(
+            "{}: not a segmentation: its samples are not whole numbers, or there are too many different ones",
+            o.in));
+    LabelSurfacesOptions options = o.label_options;
+    options.labels = parse_labels(o.labels);
+    const auto surfaces =
+        naming(o.in, [&] { return label_surfaces(in.map, options, session.stage("surfaces")); });
+    Json rows = Json::array();
+    for (const LabelSurface& s : surfaces) {
+        const MeshMeasures m = measure_mesh(s.mesh);
+        if (m.faces == 0) throw NumericalError(fmt::format("{}: there is no label {}", o.in, s.label));
+        rows.push_back({{"label", s.label},
+                        {"components", m.components},
+                        {"faces", m.faces},
+                        {"area_A2", m.area_A2},
+                        {"volume_A3", m.volume_A3 ? Json(*m.volume_A3) : Json()}});
+        if (!session.json)
+            session.say(fmt::format("label {:<5} {:>7} pieces {:>9} faces, {:.6g} Å², {}", s.label,
+                                    m.components, m.faces, m.area_A2,
+                                    m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "open"));
+    }
+    if (surfaces.empty()) throw NumericalError(fmt::format("{}: there is no label but 0", o.in));
+    const TriMesh mesh = keep_pieces(join_labels(surfaces), o, session);
+    finish(mesh, o, {{"method", "labels"}, {"labels", rows}}, seconds, clock, session);
+}
+
 void run_surface(const SurfaceOptions& o, Session& session) {
-    if (!is_mesh_ending(o.out))
-        throw UsageError(fmt::format("{}: the ending tells the format: .ply .obj .off .stl", o.out));
+    check_mesh_output(o.out);
     const Isovalue rule = o.iso.parse();
     Json seconds;
     Clock clock;
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     seconds["read"] = clock.lap();
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
-    const Surface surface = extract_surface(o.in, in, rule, session.stage("surface"));
-    const MeshMeasures measures = measure_mesh(surface.mesh, session.stage("measuring"));
-    seconds["compute"] = clock.lap();
-    write_mesh(surface.mesh, o.out, {}, session.stage("writing"));
-    seconds["write"] = clock.lap();
-    session.end_stage();
-    Json j = measures_json(measures);
-    j["iso"] = surface.isovalue;
-    j["method"] = "marching-cubes";
-    j["seconds"] = seconds;
-    if (!session.json) {
-        session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text()));
-        for (const std::string& line : measures_text(measures)) session.say(line);
-    }
-    say_where_open(measures, session);
-    session.result(j);
+    if (!o.labels.empty()) return run_labels(o, in, seconds, clock, session);
+    const Surface surface = extract_surface(o.in, in, rule, session.stage("surface"), o.surface);
+    if (!session.json) session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text()));
+    const TriMesh mesh = keep_pieces(surface.mesh, o, session);
+    finish(mesh, o, {{"iso", surface.isovalue}, {"iso_rule", rule.text()}, {"method", o.surface.method}},
+           seconds, clock, session);
 }
 
 }  // namespace
 
 Command surface_command() {
-    return {"surface", "Extract the surface of a map or grid at an isovalue by marching cubes",
-            "  vdbgeo surface emd_1080.map groel.ply --iso 0.8", [](CLI::App& app) {
+    return {"surface", "Extract the surface of a map or grid at an isovalue, or those of a segmentation",
+            "  vdbgeo surface emd_1080.map groel.ply --iso 0.8\n"
+            "  vdbgeo surface emd_1080.map good.ply --iso 0.8 --method delaunay --keep-largest 1",
+            [](CLI::App& app) {
                 auto o = std::make_shared<SurfaceOptions>();
                 app.add_option("in", o->in, "Map (MRC, CCP4) or VDB grid")->required();
-                app.add_option("out", o->out, "Mesh to write: .ply .obj .off .stl")->required();
+                app.add_option("out", o->out, "Mesh to write: " + mesh_endings_text())->required();
                 o->iso.add(app);
+                o->surface.add(app);
+                o->components.add(app);
+                app.add_flag("--split", o->split,
+                             "One file a piece, the largest first: OUT_0001.ply and so on");
+                app.add_option("--labels", o->labels,
+                               "The map is a segmentation: smooth closed surfaces of all its labels, or of a "
+                               "list such as 1,2,5");
+                app.add_option("--label-iterations", o->label_options.iterations,
+                               "Rounds of smoothing of the labels' surfaces, 0 for the bare staircase")
+                    ->capture_default_str();
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);
                 return [o](Session& session) {
                     o->map.finish();
+                    o->surface.finish();
+                    check_usage(o->components.filter);
+                    check_usage(o->label_options);
                     run_surface(*o, session);
                 };
             }};

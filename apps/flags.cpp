@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "converters/emdb_record.h"
+
 namespace vdbgeo::app {
 namespace {
 
@@ -166,13 +168,18 @@ void MapFlags::finish() {
 }
 
 void IsoFlag::add(CLI::App& app) {
-    app.add_option("--iso", text,
-                   "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a "
-                   "level set, half the maximum for a fog volume)")
+    app.add_option(
+           "--iso", text,
+           "Isovalue: a density in the map's units, Nsigma (mean + N rms), volume:V (encloses V Å³), "
+           "mass:M (encloses M Da, or 800kDa), otsu, record:FILE (what the map's EMDB record, JSON or "
+           "XML, recommends), or auto (3sigma; 0 for a level set, half the maximum for a fog volume)")
         ->capture_default_str();
 }
 
 Isovalue IsoFlag::parse() const {
+    const std::string record = "record:";
+    if (text.rfind(record, 0) == 0)
+        return {Isovalue::Rule::value, recommended_contour(text.substr(record.size()))};
     try {
         return Isovalue::parse(text);
     } catch (const InvalidInput& e) {

@@ -1,11 +1,14 @@
 #include "apps/stages.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
 
+#include "converters/mesh_file.h"
 #include "converters/nanovdb_file.h"
-#include "vdbgeo/surface/marching_cubes.h"
+#include "vdbgeo/view/colormap.h"
 #include "vdbgeo/view/plot.h"
 #include "vdbgeo/view/png.h"
 #include "vdbgeo/volume/grid_builder.h"
@@ -13,19 +16,17 @@
 namespace vdbgeo::app {
 
 Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
-                        const Progress& progress) {
+                        const Progress& progress, const SurfaceFlags& flags) {
     Surface surface;
     naming(name, [&] {
         surface.isovalue = rule.resolve(in.map.statistics, in.map.grid->getGridClass());
-        surface.mesh = marching_cubes(in.map, {surface.isovalue}, progress);
+        surface.mesh = flags.extract(in, surface.isovalue, progress);
     });
     if (surface.mesh.empty())
         throw NumericalError(
             fmt::format("{}: no surface at the isovalue {:.6g}: the map's values lie between {:.6g} and "
                         "{:.6g}; try another --iso",
                         name, surface.isovalue, in.map.statistics.min, in.map.statistics.max));
-    if (in.level_set)
-        for (Triangle& t : surface.mesh.triangles) std::swap(t[1], t[2]);
     return surface;
 }
 
@@ -83,6 +84,31 @@ void say_where_open(const MeshMeasures& m, Session& session) {
             m.boundary_edges));
 }
 
+std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& path,
+                                      const Progress& progress) {
+    const MeshComponents pieces = mesh_components(mesh, progress.part(0, 0.2));
+    const std::size_t count = pieces.components.size();
+    const std::filesystem::path out(path);
+    const std::string stem = (out.parent_path() / out.stem()).string(), ending = out.extension().string();
+    const std::size_t digits = std::max<std::size_t>(4, fmt::format("{}", count).size());
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < count; ++i) {
+        std::vector<bool> keep(count, false);
+        keep[i] = true;
+        names.push_back(fmt::format("{}_{:0{}}{}", stem, i + 1, digits, ending));
+        write_mesh(extract_components(mesh, pieces, keep), names.back());
+        progress.report(0.2 + 0.8 * static_cast<double>(i + 1) / static_cast<double>(count));
+    }
+    return names;
+}
+
+std::string mesh_endings_text() { return fmt::format("{}", fmt::join(mesh_endings(), " ")); }
+
+void check_mesh_output(const std::string& path) {
+    if (!is_mesh_ending(path))
+        throw UsageError(fmt::format("{}: the ending tells the format: {}", path, mesh_endings_text()));
+}
+
 void write_angle_histogram(const MeshMeasures& measures, const std::string& path) {
     PlotOptions options;
     options.title = "Angles of the triangles";
@@ -91,6 +117,47 @@ void write_angle_histogram(const MeshMeasures& measures, const std::string& path
     write_png(
         plot_histogram({measures.angle_histogram.begin(), measures.angle_histogram.end()}, 0, 180, options),
         path);
+}
+
+void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasures>>& meshes,
+                            const std::string& path) {
+    if (meshes.size() == 1) return write_angle_histogram(meshes[0].second, path);
+    const Colormap colours("categorical");
+    PlotOptions options;
+    options.title = "Angles of the triangles";
+    options.x_label = "angle (°)";
+    options.y_label = "part of the angles, % a degree";
+    std::vector<Curve> curves;
+    for (const auto& [name, m] : meshes) {
+        Curve curve{name, {}, {}, colours.category(static_cast<std::int64_t>(curves.size()))};
+        for (std::size_t k = 0; k < m.angle_histogram.size(); ++k) {
+            curve.x.push_back(static_cast<double>(k) + 0.5);
+            curve.y.push_back(100 * static_cast<double>(m.angle_histogram[k]) /
+                              (3 * static_cast<double>(std::max<std::uint64_t>(1, m.faces))));
+        }
+        curves.push_back(std::move(curve));
+    }
+    write_png(plot_curves(curves, false, options), path);
+}
+
+void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path) {
+    if (rows.empty()) throw NumericalError("no isovalue gives a surface: there is nothing to draw");
+    const Colormap colours("categorical");
+    std::vector<Curve> curves{{"volume (Å³)", {}, {}, colours.category(0)},
+                              {"area (Å²)", {}, {}, colours.category(1)},
+                              {"pieces", {}, {}, colours.category(2)}};
+    PlotOptions options;
+    options.title = "The surface over the isovalue";
+    options.x_label = "isovalue (the map's units)";
+    options.x_low = rows[0].isovalue;
+    for (const IsovalueRow& row : rows) {
+        options.x_low = std::min(options.x_low, row.isovalue);
+        for (Curve& curve : curves) curve.x.push_back(row.isovalue);
+        curves[0].y.push_back(row.volume_A3);
+        curves[1].y.push_back(row.area_A2);
+        curves[2].y.push_back(static_cast<double>(row.components));
+    }
+    write_png(plot_curves(curves, true, options), path);
 }
 
 bool has_ending(const std::string& name, const std::string& ending) {

@@ -5,10 +5,12 @@
 #include <string>
 
 #include "apps/session.h"
+#include "apps/surface_flags.h"
 #include "converters/map_file.h"
 #include "converters/vdb_file.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/tri_mesh.h"
+#include "vdbgeo/measure/isovalue_table.h"
 #include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/volume/isovalue.h"
 #include "vdbgeo/volume/phantom.h"
@@ -32,10 +34,10 @@ auto naming(const std::string& name, const Body& body) -> decltype(body()) {
     }
 }
 
-/// The surface of a map by marching cubes; of a level set (negative inside) with its faces turned outward.
-/// NumericalError where nothing crosses the isovalue, telling the map's range.
+/// The surface of a map by marching cubes, or as the flags say; of a level set (negative inside) with its
+/// faces turned outward. NumericalError where nothing crosses the isovalue, telling the map's range.
 Surface extract_surface(const std::string& name, const MapFile& in, const Isovalue& rule,
-                        const Progress& progress);
+                        const Progress& progress, const SurfaceFlags& flags = {});
 
 /// For a command that writes a file to standard output; UsageError with --json, which wants it too.
 void take_output(Session& session);
@@ -55,8 +57,22 @@ DensityMap phantom_map(const Phantom& phantom, bool truth, const Progress& progr
 /// One line where the surface is open: it can be so only where the density meets the border of the map.
 void say_where_open(const MeshMeasures& measures, Session& session);
 
-/// The histogram of the triangles' angles (the paper's Fig 7) as a picture.
+/// One file a piece, by area, the largest first: OUT_0001.ply … Returns their names.
+std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& path, const Progress& progress);
+
+/// UsageError unless a mesh can be written under this name.
+void check_mesh_output(const std::string& path);
+
+/// The endings of mesh files, for help texts: ".ply .obj …".
+std::string mesh_endings_text();
+
+/// The histogram of the triangles' angles (the paper's Fig 7) as a picture; of several meshes as curves.
 void write_angle_histogram(const MeshMeasures& measures, const std::string& path);
+void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasures>>& meshes,
+                            const std::string& path);
+
+/// Volume, area and pieces of a surface over the isovalue, as a picture.
+void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path);
 
 bool has_ending(const std::string& name, const std::string& ending);
 

@@ -79,22 +79,22 @@ void draw_words(Image& image, const Frame2d& frame, const PlotOptions& options, 
 
 /// Highest and lowest value that is drawn, and the largest x.
 struct Extent {
-    double x = 0, low = std::numeric_limits<double>::infinity(), high = -low;
+    double x, low = std::numeric_limits<double>::infinity(), high = -low;
     bool empty() const { return low > high; }
 };
 
 bool drawn(double y, bool logarithmic) { return std::isfinite(y) && (!logarithmic || y > 0); }
 
-Extent extent_of(const std::vector<Curve>& curves, bool logarithmic) {
-    Extent e;
+Extent extent_of(const std::vector<Curve>& curves, bool logarithmic, double x_low) {
+    Extent e{x_low};
     for (const Curve& curve : curves) {
         if (curve.x.size() != curve.y.size())
             throw InvalidInput(
                 fmt::format("a curve has {} values of x and {} of y", curve.x.size(), curve.y.size()));
         for (std::size_t i = 0; i < curve.x.size(); ++i) {
-            if (!std::isfinite(curve.x[i]) || curve.x[i] < 0)
-                throw InvalidInput(
-                    fmt::format("value {} of x is {}: it must be finite and not negative", i, curve.x[i]));
+            if (!std::isfinite(curve.x[i]) || curve.x[i] < x_low)
+                throw InvalidInput(fmt::format("value {} of x is {}: it must be finite and not below {}", i,
+                                               curve.x[i], x_low));
             e.x = std::max(e.x, curve.x[i]);
             if (!drawn(curve.y[i], logarithmic)) continue;
             e.low = std::min(e.low, curve.y[i]);
@@ -205,11 +205,12 @@ Image plot_histogram(const std::vector<double>& counts, double lo, double hi, co
 
 Image plot_curves(const std::vector<Curve>& curves, bool logarithmic, const PlotOptions& options) {
     options.check();
-    const Extent extent = extent_of(curves, logarithmic);
+    const Extent extent = extent_of(curves, logarithmic, options.x_low);
     Image image(options.width, options.height);
     const double em = em_of(options);
     Frame2d frame = frame_of(options, em);
-    frame.x_high = extent.x > 0 ? extent.x : 1;
+    frame.x_low = options.x_low;
+    frame.x_high = extent.x > options.x_low ? extent.x : options.x_low + 1;
     const Ticks ys = logarithmic ? logarithmic_axis(frame, extent) : linear_axis(frame, extent, em);
     const Ticks xs = finish_frame(frame, ys, options, em);
     for (const double value : ys.values)

@@ -12,6 +12,7 @@ struct PlotOptions {
     std::string title, x_label, y_label;  ///< empty: none
     int width = 1000, height = 640;       ///< pixels, each 160…Image::max_side
     Vec3f bars{0.33f, 0.53f, 0.72f};      ///< sRGB
+    double x_low = 0;                     ///< where the x axis of curves begins
 
     /// Throws InvalidInput naming the first option out of its range.
     void check() const;
@@ -31,9 +32,9 @@ struct Curve {
     Vec3f colour{0.33f, 0.53f, 0.72f};  ///< sRGB
 };
 
-/// Curves over a linear x axis from 0, with y linear or by powers of ten (at most eight of them, the
+/// Curves over a linear x axis from x_low, with y linear or by powers of ten (at most eight of them, the
 /// highest). Errors: InvalidInput for a curve whose x and y differ in number, or whose x is not finite or
-/// below 0.
+/// below x_low.
 Image plot_curves(const std::vector<Curve>& curves, bool logarithmic, const PlotOptions& options = {});
 
 }  // namespace vdbgeo

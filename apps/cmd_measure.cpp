@@ -7,16 +7,17 @@
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
+#include "vdbgeo/measure/surface_distance.h"
 
 namespace vdbgeo::app {
 namespace {
 
 struct MeasureOptions {
     std::vector<std::string> in;
-    std::string histogram;
+    std::string histogram, distance;
 };
 
-Json measure_one(const std::string& file, MeshMeasures& measures, Session& session) {
+Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures& measures, Session& session) {
     Json seconds;
     Clock clock;
     const TriMesh mesh = read_mesh(file, session.stage("reading"));
@@ -27,6 +28,16 @@ Json measure_one(const std::string& file, MeshMeasures& measures, Session& sessi
     Json j{{"file", file}};
     j.update(measures_json(measures));
     j["angle_histogram"] = measures.angle_histogram;
+    if (!o.distance.empty()) {
+        const TriMesh other = read_mesh(o.distance, session.stage("reading"));
+        const SurfaceDistance d =
+            naming(file, [&] { return surface_distance(mesh, other, {}, session.stage("distance")); });
+        seconds["distance"] = clock.lap();
+        session.end_stage();
+        j["hausdorff_A"] = d.hausdorff;
+        j["distance_forward"] = one_sided_json(d.forward);
+        j["distance_backward"] = one_sided_json(d.backward);
+    }
     j["seconds"] = seconds;
     return j;
 }
@@ -34,14 +45,18 @@ Json measure_one(const std::string& file, MeshMeasures& measures, Session& sessi
 void run_measure(const MeasureOptions& o, Session& session) {
     if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
         throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
+    if (!o.distance.empty() && o.in.size() > 1) throw UsageError("--distance is that of one mesh to another");
     Json all = Json::array();
     std::vector<std::pair<std::string, MeshMeasures>> meshes;
     for (const std::string& file : o.in) {
         meshes.emplace_back(std::filesystem::path(file).filename().string(), MeshMeasures{});
-        all.push_back(measure_one(file, meshes.back().second, session));
+        all.push_back(measure_one(file, o, meshes.back().second, session));
         if (session.json) continue;
         if (o.in.size() > 1) session.say(file + ":");
         for (const std::string& line : measures_text(meshes.back().second)) session.say(line);
+        if (!o.distance.empty())
+            session.say(fmt::format("distance    {:.4g} Å at most (Hausdorff)",
+                                    all.back()["hausdorff_A"].get<double>()));
         if (file != o.in.back()) session.say("");
     }
     if (!o.histogram.empty()) write_angle_histograms(meshes, o.histogram);
@@ -59,6 +74,8 @@ Command measure_command() {
                     "--histogram", o->histogram,
                     "Write the histogram of the triangles' angles as a PNG here, of several meshes as "
                     "curves");
+                app.add_option("--distance", o->distance,
+                               "Measure how far the mesh is from this one, both ways, in Å");
                 return [o](Session& session) { run_measure(*o, session); };
             }};
 }

@@ -8,14 +8,6 @@
 #include "vdbgeo/measure/surface_distance.h"
 
 namespace vdbgeo::app {
-namespace {
-
-Json one_sided_json(const OneSidedDistance& d) {
-    return {{"max_A", d.max}, {"p999_A", d.p999}, {"rms_A", d.rms}, {"mean_A", d.mean}};
-}
-
-}  // namespace
-
 void MeshCommandFlags::add(CLI::App& app, bool distance) {
     app.add_option("in", in, "Mesh: " + mesh_endings_text())->required();
     app.add_option("out", out, "Mesh to write: " + mesh_endings_text())->required();

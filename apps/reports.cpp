@@ -58,6 +58,10 @@ std::string versions_text() {
 
 Json to_json(const Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
+Json one_sided_json(const OneSidedDistance& d) {
+    return {{"max_A", d.max}, {"p999_A", d.p999}, {"rms_A", d.rms}, {"mean_A", d.mean}};
+}
+
 Json measures_json(const MeshMeasures& m) {
     Json j;
     j["vertices"] = m.vertices;

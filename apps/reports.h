@@ -7,6 +7,7 @@
 #include "apps/session.h"
 #include "converters/map_file.h"
 #include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/measure/surface_distance.h"
 
 namespace vdbgeo::app {
 
@@ -14,6 +15,7 @@ Json versions_json();
 std::string versions_text();
 
 Json to_json(const Vec3d& v);
+Json one_sided_json(const OneSidedDistance& d);
 Json measures_json(const MeshMeasures& m);
 std::vector<std::string> measures_text(const MeshMeasures& m);
 

@@ -88,6 +88,11 @@ std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& pa
                                       const Progress& progress) {
     const MeshComponents pieces = mesh_components(mesh, progress.part(0, 0.2));
     const std::size_t count = pieces.components.size();
+    constexpr std::size_t most = 1000;
+    if (count > most)
+        throw InvalidInput(fmt::format(
+            "{}: --split would write {} files, more than {}; drop dust first (--min-volume, --keep-largest)",
+            path, count, most));
     const std::filesystem::path out(path);
     const std::string stem = (out.parent_path() / out.stem()).string(), ending = out.extension().string();
     const std::size_t digits = std::max<std::size_t>(4, fmt::format("{}", count).size());

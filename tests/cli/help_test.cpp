@@ -7,8 +7,9 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info", "convert", "phantom", "denoise", "edges", "transform",
-                         "flow", "surface", "measure", "render",  "model"};
+const Words all_commands{"info",    "convert",    "phantom", "denoise",  "edges",  "transform",
+                         "flow",    "surface",    "remesh",  "simplify", "smooth", "repair",
+                         "measure", "components", "render",  "model"};
 
 struct Promise {
     const char* command;
@@ -27,8 +28,15 @@ const std::vector<Promise> promises{
     {"transform",
      {"--orders", "--times", "in voxels^(2q+2)", "[inf]", "--keep", "--band-pass", "OUT_mode_1.mrc"}},
     {"flow", {"--surface", "voxels^2", "--iso TEXT=auto", "signed distances in Å", "--density-scale"}},
-    {"surface", {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å"}},
+    {"surface",
+     {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å", "--method TEXT=marching-cubes",
+      "in voxels, or in Å", "in Å³", "in Å²", "in seconds"}},
+    {"remesh", {"--method TEXT=isotropic", "in Å", "in degrees", "[mean edge of the input]"}},
+    {"simplify", {"--faces", "in Å"}},
+    {"smooth", {"--method TEXT=taubin", "in Å^4"}},
+    {"repair", {"--max-hole UINT=1000"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
+    {"components", {"in Å³", "in Å²", "--list UINT=20"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
 
@@ -108,8 +116,11 @@ TEST_F(Help, ExamplesRun) {
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
         }
     }
-    for (const char* made : {"emd_1080.vdb", "smooth.mrc", "smooth.png", "median.mrc", "edges.mrc",
-                             "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc", "flowed.mrc", "smooth.vdb",
-                             "atpase.mrc", "clean.mrc", "groel.png", "groel/surface.ply"})
+    for (const char* made :
+         {"emd_1080.vdb",     "smooth.mrc",        "smooth.png", "median.mrc",        "edges.mrc",
+          "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",   "flowed.mrc",        "smooth.vdb",
+          "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
+          "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
+          "round.ply",        "sound.ply",         "clean.ply",  "levels.png"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -1,0 +1,432 @@
+#include "vdbgeo/surface/seeded_delaunay.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include "vdbgeo/core/errors.h"
+
+namespace vdbgeo {
+namespace {
+
+constexpr int max_rounds = 9;
+constexpr double seed_spacing = 1.2;     // in radius bounds
+constexpr double small_component = 0.15;  // its radius bound, in its diagonals
+
+/// Numbers kept by the cube of space they are in.
+class SpaceHash {
+ public:
+    explicit SpaceHash(double side) : scale_(1 / side) {}
+
+    using Cell = std::array<std::int64_t, 3>;
+    Cell cell(const Vec3d& p) const {
+        Cell c;
+        for (int a = 0; a < 3; ++a) c[static_cast<std::size_t>(a)] = static_cast<std::int64_t>(std::floor(p[a] * scale_));
+        return c;
+    }
+    void add(const Vec3d& p, std::uint32_t number) { cells_[cell(p)].push_back(number); }
+    /// Calls visit(number) for all in the cubes around p, itself included, until it returns true.
+    template <class Visit>
+    bool near(const Vec3d& p, const Visit& visit) const {
+        const Cell c = cell(p);
+        for (std::int64_t i = -1; i <= 1; ++i)
+            for (std::int64_t j = -1; j <= 1; ++j)
+                for (std::int64_t k = -1; k <= 1; ++k) {
+                    const auto found = cells_.find({c[0] + i, c[1] + j, c[2] + k});
+                    if (found == cells_.end()) continue;
+                    for (const std::uint32_t n : found->second)
+                        if (visit(n)) return true;
+                }
+        return false;
+    }
+
+ private:
+    struct Hash {
+        std::size_t operator()(const Cell& c) const {
+            std::uint64_t h = static_cast<std::uint64_t>(c[0]) * 0x9E3779B97F4A7C15ull ^
+                              static_cast<std::uint64_t>(c[1]) * 0xC2B2AE3D27D4EB4Full ^
+                              static_cast<std::uint64_t>(c[2]) * 0x165667B19E3779F9ull;
+            return static_cast<std::size_t>(h ^ h >> 31);
+        }
+    };
+    double scale_;
+    std::unordered_map<Cell, std::vector<std::uint32_t>, Hash> cells_;
+};
+
+/// The component of each point, numbered in the order of the points; unused points get numbers of their own after
+/// all others.
+struct Components {
+    std::vector<std::uint32_t> of_point;
+    std::uint32_t count = 0;
+};
+
+template <class Triangles>
+Components components_of(std::size_t points, const Triangles& triangles) {
+    std::vector<std::uint32_t> parent(points);
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const Triangle& t : triangles)
+        for (std::size_t k = 1; k < 3; ++k) {
+            const std::uint32_t a = root(t[0]), b = root(t[k]);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    std::vector<bool> used(points, false);
+    for (const Triangle& t : triangles)
+        for (const VertexId v : t) used[v] = true;
+    Components out;
+    out.of_point.resize(points);
+    for (const bool want : {true, false}) {
+        for (std::uint32_t v = 0; v < points; ++v)
+            if (used[v] == want) {
+                const std::uint32_t r = root(v);
+                out.of_point[v] = r == v ? out.count++ : out.of_point[r];
+            }
+        if (want) {
+            // Unused points are numbered too, but not counted.
+            const std::uint32_t count = out.count;
+            for (std::uint32_t v = 0, next = count; v < points; ++v)
+                if (!used[v]) out.of_point[v] = next++;
+            return out;
+        }
+    }
+    return out;
+}
+
+class SeededRun {
+ public:
+    SeededRun(const Solid& solid, const Vec3d& low, const Vec3d& high, const ReferenceMesh& reference,
+              const SeededBounds& bounds, const Progress& progress)
+        : solid_(solid),
+          reference_(reference),
+          bounds_(bounds),
+          progress_(progress),
+          parts_(components_of(reference.points.size(), reference.triangles)),
+          fine_(bounds.radius),
+          mesher_(solid, low, high, delaunay_bounds()) {
+        measure_components();
+    }
+
+    DelaunayMesh run();
+
+ private:
+    struct Part {
+        Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity());
+        Vec3d high = -low;
+        double radius = 0;  // bound
+        bool open = false;
+    };
+    struct Spot {
+        Vec3d place;
+        double radius;
+    };
+    struct Faults {
+        std::uint64_t missing = 0, joined = 0, parted = 0;
+        std::vector<Vec3d> places;
+        bool components_differ() const { return missing + joined + parted > 0; }
+    };
+
+    DelaunayBounds delaunay_bounds() {
+        DelaunayBounds out;
+        out.angle_deg = bounds_.angle_deg;
+        out.radius = bounds_.radius;
+        out.distance = bounds_.distance;
+        out.smallest = bounds_.radius / 32;
+        out.max_vertices = bounds_.max_vertices;
+        out.max_seconds = bounds_.max_seconds;
+        out.deadline = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                                                              std::chrono::duration<double>(bounds_.max_seconds));
+        out.local_radius = [this](const Vec3d& p) { return local_radius(p); };
+        return out;
+    }
+
+    double local_radius(const Vec3d& p) const {
+        double radius = bounds_.radius;
+        if (spots_.empty()) return radius;
+        fine_.near(p, [&](std::uint32_t n) {
+            const Spot& spot = spots_[n];
+            if (spot.radius < radius && (spot.place - p).squaredNorm() < bounds_.radius * bounds_.radius)
+                radius = spot.radius;
+            return false;
+        });
+        return radius;
+    }
+    void add_spot(const Vec3d& place, double radius) {
+        fine_.add(place, static_cast<std::uint32_t>(spots_.size()));
+        spots_.push_back({place, radius});
+    }
+
+    void measure_components();
+    void find_open_components();
+    Vec3d on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3d& fallback) const;
+    template <class Wanted>
+    std::vector<Vec3d> make_seeds(const Wanted& wanted);
+    Faults compare(const DelaunayMesh& mesh, bool places) const;
+    void add_uncovered(const DelaunayMesh& mesh, Faults& faults) const;
+    std::vector<Vec3d> densify(const std::vector<Vec3d>& places);
+    double expected_vertices() const;
+
+    const Solid& solid_;
+    const ReferenceMesh& reference_;
+    const SeededBounds bounds_;
+    const Progress& progress_;
+    const Components parts_;
+    std::vector<Part> part_;
+    std::vector<std::uint32_t> seed_part_;  // of every seed so far; an extra seed has none
+    SpaceHash fine_;
+    std::vector<Spot> spots_;
+    DelaunayMesher mesher_;
+};
+
+void SeededRun::measure_components() {
+    part_.resize(parts_.count);
+    for (const Triangle& t : reference_.triangles)
+        for (const VertexId v : t) {
+            Part& part = part_[parts_.of_point[v]];
+            part.low = part.low.cwiseMin(reference_.points[v]);
+            part.high = part.high.cwiseMax(reference_.points[v]);
+        }
+    for (Part& part : part_)
+        part.radius = std::min(bounds_.radius, small_component * (part.high - part.low).norm());
+    find_open_components();
+    std::vector<char> marked(reference_.points.size(), 0);
+    for (const Triangle& t : reference_.triangles)
+        for (const VertexId v : t) {
+            const Part& part = part_[parts_.of_point[v]];
+            if (part.radius >= bounds_.radius || marked[v]) continue;
+            marked[v] = 1;
+            add_spot(reference_.points[v], part.radius);
+        }
+}
+
+void SeededRun::find_open_components() {
+    std::vector<std::uint64_t> sides;
+    sides.reserve(3 * reference_.triangles.size());
+    for (const Triangle& t : reference_.triangles)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint64_t a = t[k], b = t[(k + 1) % 3];
+            sides.push_back(std::min(a, b) << 32 | std::max(a, b));
+        }
+    std::sort(sides.begin(), sides.end());
+    for (std::size_t i = 0; i < sides.size();) {
+        std::size_t j = i;
+        while (j < sides.size() && sides[j] == sides[i]) ++j;
+        if (j - i == 1) part_[parts_.of_point[sides[i] >> 32]].open = true;
+        i = j;
+    }
+}
+
+/// The point of the surface on the normal through a face's centre, or one of the face's corners where it is not
+/// within half a radius bound. (Corners lie on the lattice's edges, many in one plane: bad for exact predicates.)
+Vec3d SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3d& fallback) const {
+    const double start = solid_(centre);
+    const bool inside = start >= 0;
+    const Vec3d out = inside ? normal : Vec3d(-normal);
+    double near = 0, far = 0;
+    for (double reach = bounds_.radius / 64; reach < 0.6 * bounds_.radius; reach *= 2) {
+        if ((solid_(centre + reach * out) >= 0) != inside) {
+            far = reach;
+            break;
+        }
+        near = reach;
+    }
+    if (far == 0) return fallback;
+    for (int step = 0; step < 30 && far - near > 1e-6 * bounds_.radius; ++step) {
+        const double middle = 0.5 * (near + far);
+        ((solid_(centre + middle * out) >= 0) == inside ? near : far) = middle;
+    }
+    return centre + 0.5 * (near + far) * out;
+}
+
+/// Seeds on the faces that are wanted, none nearer than the spacing to another of the same component that faces the
+/// same way.
+template <class Wanted>
+std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
+    struct Seed {
+        Vec3d place, normal;
+        std::uint32_t part;
+    };
+    std::vector<Seed> seeds;
+    SpaceHash hash(seed_spacing * bounds_.radius);
+    for (const Triangle& t : reference_.triangles) {
+        const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
+        const std::uint32_t part = parts_.of_point[t[0]];
+        const Vec3d centre = (a + b + c) / 3;
+        if (!wanted(centre)) continue;
+        const double spacing = seed_spacing * std::min(part_[part].radius, local_radius(centre));
+        const Vec3d normal = (b - a).cross(c - a).normalized();
+        if (!normal.allFinite()) continue;
+        const bool taken = hash.near(centre, [&](std::uint32_t n) {
+            const Seed& s = seeds[n];
+            return s.part == part && (s.place - centre).squaredNorm() < spacing * spacing && s.normal.dot(normal) > 0;
+        });
+        if (taken) continue;
+        const Vec3d place = on_surface(centre, normal, a);
+        hash.add(place, static_cast<std::uint32_t>(seeds.size()));
+        seeds.push_back({place, normal, part});
+    }
+    std::vector<Vec3d> places;
+    for (const Seed& s : seeds) {
+        places.push_back(s.place);
+        seed_part_.push_back(s.part);
+    }
+    return places;
+}
+
+/// Which components of the reference are not there, joined or parted; with `places`, where.
+SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) const {
+    Faults faults;
+    const Components got = components_of(mesh.points.size(), mesh.triangles);
+    // Through the seeds, a bipartite graph between the components here and there.
+    std::vector<std::vector<std::uint32_t>> there(parts_.count), here(got.count);
+    const auto note = [](std::vector<std::uint32_t>& list, std::uint32_t n) {
+        if (std::find(list.begin(), list.end(), n) == list.end()) list.push_back(n);
+    };
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        if (mesh.seed[v] == DelaunayMesh::no_seed) continue;
+        const std::uint32_t part = seed_part_[mesh.seed[v]];
+        if (part == DelaunayMesh::no_seed) continue;
+        note(there[part], got.of_point[v]);
+        note(here[got.of_point[v]], part);
+    }
+    std::vector<char> wrong(parts_.count, 0);   // components of the reference to seed denser all over
+    std::vector<char> parted(parts_.count, 0), joined(got.count, 0);
+    for (std::uint32_t p = 0; p < parts_.count; ++p) {
+        if (there[p].empty()) {
+            ++faults.missing;
+            wrong[p] = 1;
+        } else if (there[p].size() > 1) {
+            ++faults.parted;
+            parted[p] = 1;
+        }
+    }
+    for (std::uint32_t g = 0; g < got.count; ++g) {
+        if (here[g].size() < 2) continue;
+        const auto closed = std::count_if(here[g].begin(), here[g].end(), [&](std::uint32_t p) { return !part_[p].open; });
+        if (closed == 0) continue;
+        ++faults.joined;
+        joined[g] = 1;
+    }
+    if (!places || !faults.components_differ()) return faults;
+
+    const double reach = bounds_.radius;
+    SpaceHash vertices(reach), points(reach);
+    for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
+    const auto nearest = [&](const SpaceHash& hash, const Vec3d& p, const auto& at, const auto& of, const auto& among) {
+        double best = std::numeric_limits<double>::infinity();
+        std::uint32_t label = DelaunayMesh::no_seed;
+        hash.near(p, [&](std::uint32_t n) {
+            const double d = (at[n] - p).squaredNorm();
+            if (d < best && std::find(among.begin(), among.end(), of[n]) != among.end()) {
+                best = d;
+                label = of[n];
+            }
+            return false;
+        });
+        return label;
+    };
+    const bool any_joined = std::count(joined.begin(), joined.end(), 1) > 0;
+    std::vector<std::uint32_t> label(reference_.points.size(), DelaunayMesh::no_seed);
+    std::vector<char> seen(reference_.points.size(), 0);
+    for (const Triangle& t : reference_.triangles)
+        for (const VertexId v : t) {
+            if (seen[v]) continue;
+            seen[v] = 1;
+            const std::uint32_t p = parts_.of_point[v];
+            if (any_joined) points.add(reference_.points[v], v);
+            if (wrong[p]) faults.places.push_back(reference_.points[v]);
+            if (parted[p]) label[v] = nearest(vertices, reference_.points[v], mesh.points, got.of_point, there[p]);
+        }
+    for (const Triangle& t : reference_.triangles)
+        if (parted[parts_.of_point[t[0]]] && (label[t[0]] != label[t[1]] || label[t[0]] != label[t[2]]))
+            faults.places.push_back(reference_.points[t[0]]);
+    if (!any_joined) return faults;
+    label.assign(mesh.points.size(), DelaunayMesh::no_seed);
+    for (std::uint32_t v = 0; v < mesh.points.size(); ++v) {
+        const std::uint32_t g = got.of_point[v];
+        if (joined[g]) label[v] = nearest(points, mesh.points[v], reference_.points, parts_.of_point, here[g]);
+    }
+    for (const Triangle& t : mesh.triangles)
+        if (joined[got.of_point[t[0]]] && (label[t[0]] != label[t[1]] || label[t[0]] != label[t[2]]))
+            for (const VertexId v : t) faults.places.push_back(mesh.points[v]);
+    return faults;
+}
+
+/// Vertices of the reference that nothing of the mesh is near to.
+void SeededRun::add_uncovered(const DelaunayMesh& mesh, Faults& faults) const {
+    const double reach = bounds_.radius;
+    SpaceHash vertices(reach);
+    for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
+    for (const Vec3d& p : reference_.points) {
+        const bool covered = vertices.near(
+            p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; });
+        if (!covered) faults.places.push_back(p);
+    }
+}
+
+/// Halves the radius bound around the places and seeds there.
+std::vector<Vec3d> SeededRun::densify(const std::vector<Vec3d>& places) {
+    SpaceHash hash(bounds_.radius);
+    std::vector<double> half;
+    for (std::uint32_t i = 0; i < places.size(); ++i) {
+        hash.add(places[i], i);
+        half.push_back(0.5 * local_radius(places[i]));
+    }
+    for (std::size_t i = 0; i < places.size(); ++i) add_spot(places[i], half[i]);
+    return make_seeds([&](const Vec3d& p) {
+        return hash.near(p, [&](std::uint32_t n) {
+            return (places[n] - p).squaredNorm() < bounds_.radius * bounds_.radius;
+        });
+    });
+}
+
+/// From the area: what is left where the facets' radius is the bound.
+double SeededRun::expected_vertices() const {
+    double vertices = 0;
+    for (const Triangle& t : reference_.triangles) {
+        const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
+        const double radius = std::min(part_[parts_.of_point[t[0]]].radius, bounds_.radius);
+        vertices += 0.5 * (b - a).cross(c - a).norm() / (radius * radius);
+    }
+    return vertices;
+}
+
+DelaunayMesh SeededRun::run() {
+    std::vector<Vec3d> seeds = make_seeds([](const Vec3d&) { return true; });
+    for (const Vec3d& p : reference_.extra_seeds) {
+        seeds.push_back(p);
+        seed_part_.push_back(DelaunayMesh::no_seed);
+    }
+    const double expected = expected_vertices();
+    for (int round = 0;; ++round) {
+        mesher_.refine(seeds, expected, progress_.part(round == 0 ? 0 : 0.9, round == 0 ? 0.9 : 1));
+        DelaunayMesh mesh = mesher_.surface();
+        const bool last = round + 1 == max_rounds;
+        Faults faults = compare(mesh, !last);
+        if (!last) add_uncovered(mesh, faults);
+        if (getenv("VDBGEO_TRACE")) fmt::print(stderr, "round {} seeds {} vertices {} missing {} joined {} parted {} places {}\n", round, seeds.size(), mesh.points.size(), faults.missing, faults.joined, faults.parted, faults.places.size());
+        if (faults.places.empty()) {
+            if (!faults.components_differ()) return mesh;
+            throw NumericalError(fmt::format(
+                "of {} components of the surface, Delaunay refinement missed {}, joined {} with others and split {}: "
+                "try a smaller radius, or another isovalue",
+                parts_.count, faults.missing, faults.joined, faults.parted));
+        }
+        seeds = densify(faults.places);
+    }
+}
+
+}  // namespace
+
+DelaunayMesh seeded_delaunay(const Solid& solid, const Vec3d& low, const Vec3d& high, const ReferenceMesh& reference,
+                             const SeededBounds& bounds, const Progress& progress) {
+    return SeededRun(solid, low, high, reference, bounds, progress).run();
+}
+
+}  // namespace vdbgeo

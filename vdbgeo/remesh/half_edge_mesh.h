@@ -1,10 +1,12 @@
 // TriMesh to OpenMesh half-edges and back.
 #pragma once
 
-// First what Eigen's adapter specialises, and the adapter before the meshes.
+// Eigen's adapter comes after what it specialises and before the meshes.
+// clang-format off
+#include <OpenMesh/Core/Utils/vector_traits.hh>
 #include <OpenMesh/Core/Geometry/EigenVectorT.hh>
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
-#include <OpenMesh/Core/Utils/vector_traits.hh>
+// clang-format on
 
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/remesh/face_adjacency.h"

@@ -8,8 +8,8 @@
 
 namespace vdbgeo {
 
-/// Edge lengths that follow the curvature: L = √(6 ε/κ − 3 ε²) for a chord error ε, within [min, max] (Dunyach et al.
-/// 2013, doi:10.2312/conf/EG2013/short/029-032).
+/// Edge lengths that follow the curvature: L = √(6 ε/κ − 3 ε²) for a chord error ε, within [min, max]
+/// (Dunyach et al. 2013, doi:10.2312/conf/EG2013/short/029-032).
 struct CurvatureSizing {
     double min_length = 0;  ///< Å
     double max_length = 0;  ///< Å

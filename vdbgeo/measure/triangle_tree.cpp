@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -10,6 +11,15 @@ namespace vdbgeo {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
+
+/// gcc 12 leaves the loop over four boxes scalar, which costs a third of a query.
+typedef float Float4 __attribute__((vector_size(16)));
+
+Float4 load(const float* four) {
+    Float4 value;
+    std::memcpy(&value, four, sizeof(value));
+    return value;
+}
 
 /// A face while the faces are put in order: three times its centroid, and its number.
 struct Item {
@@ -125,14 +135,14 @@ struct TriangleTree::Search {
 
     /// The squared distances to the four boxes.
     void measure(const Box4& box, float (&squared)[4]) const {
-        for (int lane = 0; lane < 4; ++lane) squared[lane] = 0;
-        for (int a = 0; a < 3; ++a)
-            for (int lane = 0; lane < 4; ++lane) {
-                const float under = box.low[a][lane] - q[a], over = q[a] - box.high[a][lane];
-                float gap = under > over ? under : over;
-                gap = gap > 0 ? gap : 0;
-                squared[lane] += gap * gap;
-            }
+        Float4 sum = {};
+        for (int a = 0; a < 3; ++a) {
+            const Float4 under = load(box.low[a]) - q[a], over = q[a] - load(box.high[a]);
+            Float4 gap = under > over ? under : over;
+            gap = gap > 0 ? gap : Float4{};
+            sum += gap * gap;
+        }
+        std::memcpy(squared, &sum, sizeof(sum));
     }
 };
 

@@ -120,7 +120,7 @@ TEST(SplitNonManifold, SheetsThatAreOneFanAtBothEndsGetMiddles) {
     const MeshMeasures before = measure_mesh(mesh);
     ASSERT_EQ(before.non_manifold_edges, 1u);
     ASSERT_EQ(before.non_manifold_vertices, 0u);
-    mesh.face_properties.push_back({"cap", 1, std::vector<float>(mesh.triangles.size(), 1)});
+    mesh.face_properties.push_back({"tag", 1, std::vector<float>(mesh.triangles.size(), 1)});
     EXPECT_EQ(split_non_manifold(mesh), 1u);
     check(mesh, "split");
     EXPECT_EQ(mesh.points.back(), Vec3f(2, 2, 1.5f));

@@ -51,8 +51,27 @@ inline TriMesh glued(const TriMesh& a, const TriMesh& b,
     return mesh;
 }
 
+/// Corners 3 and 7 of the first are 0 and 4 of the second.
 inline TriMesh two_cubes_sharing_an_edge() { return glued(cube(), cube({1, 1, 0}), {{3, 0}, {7, 4}}); }
 inline TriMesh two_cubes_sharing_a_vertex() { return glued(cube(), cube({1, 1, 1}), {{7, 0}}); }
+
+inline TriMesh moebius(int around) {
+    TriMesh mesh;
+    for (int i = 0; i < around; ++i)
+        for (const double side : {-0.3, 0.3}) {
+            const double u = 2 * M_PI * i / around, far = 1 + side * std::cos(u / 2);
+            mesh.points.emplace_back(float(far * std::cos(u)), float(far * std::sin(u)),
+                                     float(side * std::sin(u / 2)));
+        }
+    for (int i = 0; i < around; ++i) {
+        const VertexId a = VertexId(2 * i), b = a + 1;
+        VertexId c = VertexId((2 * i + 2) % (2 * around)), d = c + 1;
+        if (i + 1 == around) std::swap(c, d);
+        mesh.triangles.push_back({a, b, d});
+        mesh.triangles.push_back({a, d, c});
+    }
+    return mesh;
+}
 
 /// The faces between full and empty unit cells of a block of cells, two triangles each, with shared corners.
 template <class Full>

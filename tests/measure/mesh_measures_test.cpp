@@ -8,72 +8,13 @@
 #include <limits>
 #include <numeric>
 
-#include "tests/support/meshes.h"
+#include "tests/support/small_meshes.h"
 #include "vdbgeo/core/errors.h"
 
 using namespace vdbgeo;
 using namespace vdbgeo::test;
 
 namespace {
-
-TriMesh mesh_of(const std::vector<Vec3f>& points, const std::vector<Triangle>& triangles) {
-    TriMesh mesh;
-    mesh.points.assign(points.begin(), points.end());
-    mesh.triangles.assign(triangles.begin(), triangles.end());
-    return mesh;
-}
-
-TriMesh tetrahedron() {
-    return mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-                   {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}});
-}
-
-/// Corner number: bit 0 x, bit 1 y, bit 2 z.
-TriMesh cube(const Vec3f& corner = {0, 0, 0}, float edge = 1) {
-    std::vector<Vec3f> points;
-    for (int i = 0; i < 8; ++i)
-        points.push_back(corner + edge * Vec3f(float(i & 1), float(i >> 1 & 1), float(i >> 2 & 1)));
-    return mesh_of(points, {{0, 2, 3},
-                            {0, 3, 1},
-                            {4, 5, 7},
-                            {4, 7, 6},
-                            {0, 1, 5},
-                            {0, 5, 4},
-                            {2, 6, 7},
-                            {2, 7, 3},
-                            {0, 4, 6},
-                            {0, 6, 2},
-                            {1, 3, 7},
-                            {1, 7, 5}});
-}
-
-/// Two meshes with vertices of the second put in place of those of the first.
-TriMesh glued(const TriMesh& a, const TriMesh& b, const std::vector<std::pair<VertexId, VertexId>>& pairs) {
-    TriMesh mesh = joined(a, b);
-    for (Triangle& t : mesh.triangles)
-        for (VertexId& v : t)
-            for (const auto& [in_a, in_b] : pairs)
-                if (v == a.points.size() + in_b) v = in_a;
-    return mesh;
-}
-
-TriMesh moebius(int around) {
-    TriMesh mesh;
-    for (int i = 0; i < around; ++i)
-        for (const double side : {-0.3, 0.3}) {
-            const double u = 2 * M_PI * i / around, far = 1 + side * std::cos(u / 2);
-            mesh.points.emplace_back(float(far * std::cos(u)), float(far * std::sin(u)),
-                                     float(side * std::sin(u / 2)));
-        }
-    for (int i = 0; i < around; ++i) {
-        const VertexId a = VertexId(2 * i), b = a + 1;
-        VertexId c = VertexId((2 * i + 2) % (2 * around)), d = c + 1;
-        if (i + 1 == around) std::swap(c, d);
-        mesh.triangles.push_back({a, b, d});
-        mesh.triangles.push_back({a, d, c});
-    }
-    return mesh;
-}
 
 MeshMeasures triangle(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
     return measure_mesh(mesh_of({a, b, c}, {{0, 1, 2}}));
@@ -304,4 +245,73 @@ TEST(MeshMeasures, BadMeshesAreRefused) {
     const float nothing = std::numeric_limits<float>::quiet_NaN();
     EXPECT_THROW(measure_mesh(mesh_of({{0, 0, nothing}}, {})), InvalidInput);
     EXPECT_THROW(measure_mesh(tetrahedron(), Progress([](double) { return false; })), Cancelled);
+}
+
+TEST(MeshMeasures, CapsAreNoPartOfTheAreaButBoundTheVolume) {
+    TriMesh mesh = cube();
+    mesh.face_properties.push_back({cap_property, 1, std::vector<float>(12, 0)});
+    mesh.face_properties[0].values[0] = mesh.face_properties[0].values[1] = 1;
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_EQ(m.area_A2, 5);
+    EXPECT_EQ(m.cap_area_A2, 1);
+    EXPECT_NEAR(m.volume_A3.value(), 1, 1e-15);
+}
+
+TEST(MeshMeasures, RadiusEdgeRatiosOfKnownTriangles) {
+    const MeshMeasures even = triangle({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+    EXPECT_NEAR(even.radius_edge_max, 1 / std::sqrt(3), 1e-15);
+    EXPECT_EQ(even.radius_edge_histogram[1], 1u);
+    EXPECT_EQ(even.angles_below_30_fraction, 0);
+    const MeshMeasures right = triangle({0, 0, 0}, {4, 0, 0}, {0, 3, 0});  // R = 5/2
+    EXPECT_NEAR(right.radius_edge_mean, 2.5 / 3, 1e-15);
+    const MeshMeasures needle = triangle({0, 0, 0}, {1, 0, 0}, {0.5f, 0.01f, 0});
+    EXPECT_EQ(needle.radius_edge_histogram[39], 1u);
+    EXPECT_NEAR(needle.angles_below_30_fraction, 2.0 / 3, 1e-15);
+    EXPECT_NEAR(needle.radius_edge_max, 0.5 / std::sin(needle.min_angle_deg * M_PI / 180), 1e-9);
+}
+
+TEST(MeshMeasures, AFaceWithoutAreaHasNoRadius) {
+    const MeshMeasures m = triangle({0, 0, 0}, {1, 0, 0}, {2, 0, 0});
+    EXPECT_EQ(m.radius_edge_max, 0);
+    EXPECT_EQ(m.radius_edge_mean, 0);
+    EXPECT_EQ(m.radius_edge_histogram[39], 1u);
+}
+
+TEST(MeshMeasures, DuplicateFacesAreCountedEitherWayUp) {
+    TriMesh mesh = cube();
+    EXPECT_EQ(measure_mesh(mesh).duplicate_faces, 0u);
+    mesh.triangles.push_back({3, 0, 2});
+    mesh.triangles.push_back({3, 2, 0});
+    mesh.triangles.push_back({7, 1, 5});
+    EXPECT_EQ(measure_mesh(mesh).duplicate_faces, 3u);
+    EXPECT_EQ(
+        measure_mesh(mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}})).duplicate_faces, 1u);
+}
+
+TEST(MeshMeasures, HolesAreLoopsOfBoundaryEdges) {
+    EXPECT_EQ(measure_mesh(cube()).holes, 0u);
+    EXPECT_EQ(measure_mesh(open_cylinder_mesh(1, 2)).holes, 2u);
+    EXPECT_EQ(measure_mesh(moebius(30)).holes, 1u);
+    // Holes that touch in a vertex are one: the faces between them hold together there by nothing but the
+    // vertex.
+    TriMesh mesh = icosphere(2, 1);
+    const VertexId v = mesh.triangles[0][0];
+    std::vector<std::size_t> at;
+    for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+        if (std::count(mesh.triangles[f].begin(), mesh.triangles[f].end(), v)) at.push_back(f);
+    std::size_t apart = at.size();
+    for (const std::size_t f : at) {
+        const auto shared =
+            std::count_if(mesh.triangles[f].begin(), mesh.triangles[f].end(), [&](VertexId w) {
+                const Triangle& t = mesh.triangles[at[0]];
+                return std::count(t.begin(), t.end(), w);
+            });
+        if (shared == 1) apart = f;
+    }
+    mesh.triangles.erase(mesh.triangles.begin() + std::ptrdiff_t(apart));
+    mesh.triangles.erase(mesh.triangles.begin() + std::ptrdiff_t(at[0]));
+    const MeshMeasures m = measure_mesh(mesh);
+    EXPECT_EQ(m.holes, 1u);
+    EXPECT_EQ(m.boundary_edges, 6u);
+    EXPECT_EQ(m.non_manifold_vertices, 1u);
 }

@@ -14,7 +14,9 @@ struct MeshRequirements {
     bool not_empty = true;
 };
 
-/// Throws InvalidInput "STAGE needs a closed mesh: 12 boundary edges; …repair…" unless the mesh has it all.
+/// Throws InvalidInput unless the mesh has all that is needed. The message names the stage, each thing that
+/// is missing with its counts, and what to try: "STAGE needs a closed mesh: the surface is open: 12 boundary
+/// edges in 2 holes; try repair or --cap".
 void require(const MeshMeasures& measures, const MeshRequirements& needed, const std::string& stage);
 
 }  // namespace vdbgeo

@@ -166,9 +166,11 @@ void MapFlags::finish() {
 }
 
 void IsoFlag::add(CLI::App& app) {
-    app.add_option("--iso", text,
-                   "Isovalue: a density in the map's units, Nsigma (mean + N rms), or auto (3sigma; 0 for a "
-                   "level set, half the maximum for a fog volume)")
+    app.add_option(
+           "--iso", text,
+           "Isovalue: a density in the map's units, Nsigma (mean + N rms), volume:V (encloses V Å^3), "
+           "mass:M (of M Da, or kDa, MDa: 1.23 Å^3/Da), otsu, or auto (3sigma; 0 for a level set, half "
+           "the maximum for a fog volume)")
         ->capture_default_str();
 }
 

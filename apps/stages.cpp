@@ -16,7 +16,7 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
                         const Progress& progress) {
     Surface surface;
     naming(name, [&] {
-        surface.isovalue = rule.resolve(in.map.statistics, in.map.grid->getGridClass());
+        surface.isovalue = rule.resolve(in.map);
         surface.mesh = marching_cubes(in.map, {surface.isovalue}, progress);
     });
     if (surface.mesh.empty())

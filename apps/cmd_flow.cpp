@@ -84,7 +84,7 @@ DensityMap surface_of(const FlowOptions& o, const MapFile& in, Json& result, Ses
     const Isovalue rule = o.iso.parse();
     const Progress progress = session.stage("surface");
     return naming(o.files.in, [&] {
-        const double isovalue = rule.resolve(in.map.statistics, in.map.grid->getGridClass());
+        const double isovalue = rule.resolve(in.map);
         result["iso"] = isovalue;
         LevelSetOptions options;
         options.half_width = std::max<double>(options.half_width, o.flow.surface.half_width);

@@ -75,6 +75,13 @@ Json measures_json(const MeshMeasures& m) {
     j["min_angle_deg"] = m.min_angle_deg;
     j["max_angle_deg"] = m.max_angle_deg;
     j["mean_angle_deg"] = m.mean_angle_deg;
+    j["below_30_percent"] = 100 * m.angles_below_30_fraction;
+    j["radius_edge_max"] = m.radius_edge_max;
+    j["radius_edge_mean"] = m.radius_edge_mean;
+    j["cap_area_A2"] = m.cap_area_A2;
+    j["holes"] = m.holes;
+    j["duplicate_faces"] = m.duplicate_faces;
+    j["misoriented_edges"] = m.misoriented_edges;
     j["euler_characteristic"] = m.euler_characteristic;
     j["manifold"] = m.manifold;
     j["oriented"] = m.oriented;
@@ -92,13 +99,18 @@ std::vector<std::string> measures_text(const MeshMeasures& m) {
         fmt::format("components  {}", m.components),
         fmt::format("genus       {}",
                     m.genus ? fmt::format("{}", *m.genus) : "told of closed manifolds only"),
-        fmt::format("closed      {}",
-                    m.closed ? "yes" : fmt::format("no, {} boundary edges", m.boundary_edges)),
+        fmt::format(
+            "closed      {}",
+            m.closed ? "yes" : fmt::format("no, {} boundary edges in {} holes", m.boundary_edges, m.holes)),
         fmt::format("area        {:.6g} Å²", m.area_A2),
         fmt::format("volume      {}",
                     m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "told of closed surfaces only"),
-        fmt::format("angles      {:.3g}° to {:.4g}°, mean {:.3g}°", m.min_angle_deg, m.max_angle_deg,
-                    m.mean_angle_deg)};
+        fmt::format("angles      {:.3g}° to {:.4g}°, {:.3g} % below 30°", m.min_angle_deg, m.max_angle_deg,
+                    100 * m.angles_below_30_fraction),
+        fmt::format("radius-edge {:.3g} mean, {:.3g} largest (0.577 is ideal)", m.radius_edge_mean,
+                    m.radius_edge_max)};
+    if (m.cap_area_A2 > 0) lines.push_back(fmt::format("caps        {:.6g} Å²", m.cap_area_A2));
+    if (m.duplicate_faces > 0) lines.push_back(fmt::format("duplicate   {} faces", m.duplicate_faces));
     if (!m.manifold)
         lines.push_back(fmt::format("not manifold: {} edges, {} vertices, {} degenerate faces",
                                     m.non_manifold_edges, m.non_manifold_vertices, m.degenerate_faces));

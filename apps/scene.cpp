@@ -193,8 +193,7 @@ std::vector<GridBase::ConstPtr> scene_grids(const std::string& file, const MapFi
         std::vector<GridBase::Ptr> grids;
         if (asked("density")) grids.push_back(density_grid(in, flags, levels, session.stage("density")));
         if (asked("surface")) {
-            if (!levels.isovalue)
-                levels.isovalue = flags.isovalue.resolve(in.map.statistics, in.map.grid->getGridClass());
+            if (!levels.isovalue) levels.isovalue = flags.isovalue.resolve(in.map);
             grids.push_back(level_set(in.map, *levels.isovalue, {}, session.stage("surface")));
         }
         const auto shown = shown_voxels(in, flags, grids);

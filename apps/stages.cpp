@@ -19,7 +19,7 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
                         const Progress& progress, const SurfaceFlags& flags) {
     Surface surface;
     naming(name, [&] {
-        surface.isovalue = rule.resolve(in.map.statistics, in.map.grid->getGridClass());
+        surface.isovalue = rule.resolve(in.map);
         surface.mesh = flags.extract(in, surface.isovalue, progress);
     });
     if (surface.mesh.empty())

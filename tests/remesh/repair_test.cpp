@@ -10,6 +10,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_components.h"
 #include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/measure/self_intersections.h"
 #include "vdbgeo/remesh/fill_holes.h"
 
 using namespace vdbgeo;
@@ -17,9 +18,10 @@ using namespace vdbgeo::test;
 
 namespace {
 
-RepairResult mended(const TriMesh& mesh, bool fill = true) {
+RepairResult mended(const TriMesh& mesh, bool fill = true, bool untangle = false) {
     RepairOptions options;
     options.fill_holes = fill;
+    options.self_intersections = untangle;
     RepairResult result = repair(mesh, options);
     check(result.mesh, "mended");
     return result;
@@ -49,6 +51,20 @@ TriMesh without(TriMesh mesh, const std::vector<std::size_t>& faces) {
     for (auto it = faces.rbegin(); it != faces.rend(); ++it)
         mesh.triangles.erase(mesh.triangles.begin() + std::ptrdiff_t(*it));
     return mesh;
+}
+
+/// A tube of radius ½ along a figure of eight whose strands pass each other at twice `gap`.
+TriMesh flat_eight(double gap, int around, int around_tube) {
+    const auto centre = [&](double u) {
+        return Vec3d(3 * std::sin(u), 1.5 * std::sin(2 * u), gap * std::cos(u));
+    };
+    const TriMesh tube = ring_mesh(around_tube, around, true, [&](int r, int c) {
+        const double u = 2 * M_PI * c / around, v = 2 * M_PI * r / around_tube;
+        const Vec3d along = (centre(u + 1e-4) - centre(u - 1e-4)).normalized();
+        const Vec3d side = along.cross(Vec3d::UnitZ()).normalized();
+        return Vec3d(centre(u) + 0.5 * (std::cos(v) * side + std::sin(v) * side.cross(along)));
+    });
+    return moved(tube, Eigen::AngleAxisd(0.3, Vec3d(1, 2, 3).normalized()).toRotationMatrix());
 }
 
 void flip(TriMesh& mesh, std::size_t face) { std::swap(mesh.triangles[face][0], mesh.triangles[face][1]); }
@@ -280,6 +296,71 @@ TEST(Repair, BadInputIsRefused) {
     options.max_hole_edges = 2;
     EXPECT_THROW(repair(cube(), options), InvalidInput);
     EXPECT_THROW(repair(cube(), {}, Progress([](double) { return false; })), Cancelled);
+}
+
+TEST(Untangle, ASpikeThroughTheOtherSideIsDrawnBack) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    TriMesh mesh = icosphere(3, 1);
+    mesh.points[0] *= -1.3f;
+    mesh.points[50] *= -1.2f;
+    const RepairResult r = mended(mesh, true, true);
+    EXPECT_GT(r.report.intersecting_faces_before.value(), 0u);
+    EXPECT_EQ(r.report.intersecting_faces_after, 0u);
+    EXPECT_TRUE(self_intersections(r.mesh).empty());
+    EXPECT_TRUE(good(r.mesh));
+    EXPECT_GT(r.report.moved_vertices, 1u);
+    std::size_t moved = 0;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) moved += mesh.points[v] != r.mesh.points[v];
+    EXPECT_EQ(moved, r.report.moved_vertices);
+    EXPECT_LT(moved, mesh.points.size() / 10);
+    EXPECT_EQ(measure_mesh(r.mesh).components, 1u);
+}
+
+TEST(Untangle, ATubeThatCutsItselfIsFilledAnewThere) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    const TriMesh mesh = flat_eight(0.1, 40, 10);
+    const RepairResult r = mended(mesh, true, true);
+    EXPECT_GT(r.report.refilled_faces, 0u);
+    EXPECT_LT(*r.report.intersecting_faces_after, *r.report.intersecting_faces_before / 2);
+    EXPECT_TRUE(good(r.mesh));
+    EXPECT_EQ(measure_mesh(r.mesh).components, 1u);
+}
+
+TEST(Untangle, CrossingSpheresAreReportedNotMended) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    const TriMesh mesh =
+        joined(icosphere(2, 1), moved(icosphere(2, 1), Mat3d::Identity(), Vec3d(1, 0.01, 0.02)));
+    const RepairResult r = mended(mesh, true, true);
+    EXPECT_TRUE(same(r.mesh, mesh));
+    EXPECT_GT(r.report.intersecting_faces_before.value(), 0u);
+    EXPECT_EQ(r.report.intersecting_faces_after, r.report.intersecting_faces_before);
+}
+
+TEST(Untangle, SheetsThatTouchAreDrawnApart) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    for (const TriMesh& mesh : {two_cubes_sharing_an_edge(), two_cubes_sharing_a_vertex()}) {
+        const RepairResult r = mended(mesh, true, true);
+        EXPECT_GT(r.report.intersecting_faces_before.value(), 0u);
+        EXPECT_EQ(r.report.intersecting_faces_after, 0u);
+        EXPECT_EQ(measure_mesh(r.mesh).components, 2u);
+        EXPECT_NEAR(volume(r.mesh), 2, 0.2);
+    }
+}
+
+TEST(Untangle, AGoodMeshComesBackAsItIs) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    for (const TriMesh& mesh : {TriMesh(), cube(), icosphere(2, 2), torus_mesh(3, 1, 24, 12)}) {
+        const RepairResult r = mended(mesh, true, true);
+        EXPECT_TRUE(same(r.mesh, mesh));
+        EXPECT_EQ(r.report.intersecting_faces_before, 0u);
+        EXPECT_EQ(r.report.intersecting_faces_after, 0u);
+    }
+}
+
+TEST(Untangle, NobodyLooksWhereNotAsked) {
+    RepairOptions options;
+    options.self_intersections = false;
+    EXPECT_FALSE(repair(cube(), options).report.intersecting_faces_before);
 }
 
 TEST(FillHoles, TheLidOfATubeIsFlat) {

@@ -7,9 +7,11 @@
 #include "vdbgeo/core/split_non_manifold.h"
 #include "vdbgeo/core/vertex_faces.h"
 #include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/measure/self_intersections.h"
 #include "vdbgeo/remesh/fill_holes.h"
 #include "vdbgeo/remesh/orient.h"
 #include "vdbgeo/remesh/repair_faces.h"
+#include "vdbgeo/remesh/untangle.h"
 
 namespace vdbgeo {
 namespace {
@@ -51,6 +53,14 @@ RepairResult repair(const TriMesh& mesh, const RepairOptions& options, const Pro
     const OutwardCounts turned = turn_outward(result.mesh);
     report.flipped_faces += turned.faces;
     report.flipped_pieces = turned.pieces;
+    if (options.self_intersections && have_self_intersections()) {
+        const Untangled cuts = untangle(result.mesh, max_edges, progress.part(0.3, 1));
+        report.intersecting_faces_before = cuts.before;
+        report.intersecting_faces_after = cuts.after;
+        report.moved_vertices = cuts.moved_vertices;
+        report.refilled_faces = cuts.refilled_faces;
+        report.added_faces += cuts.added_faces;
+    }
     report.unused_vertices = remove_unused_vertices(result.mesh) - report.merged_vertices;
     progress.report(1);
     return result;

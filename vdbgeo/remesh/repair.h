@@ -26,7 +26,7 @@ struct RepairReport {
     std::uint64_t flipped_pieces = 0;    ///< closed pieces that faced inward and are no cavities
     std::uint64_t split_vertices = 0;    ///< added to take sheets apart
     std::uint64_t filled_holes = 0, open_holes = 0;
-    std::uint64_t added_faces = 0;      ///< in holes
+    std::uint64_t added_faces = 0;      ///< in holes, those made to remove intersections too
     std::uint64_t unused_vertices = 0;  ///< taken out
     /// Faces that cut another; unset where nobody looked.
     std::optional<std::uint64_t> intersecting_faces_before, intersecting_faces_after;
@@ -51,11 +51,11 @@ struct RepairResult {
 /// 5. holes of at most max_hole_edges are filled (see fill_holes: large fillings are plain, folded ones are
 /// refused);
 /// 6. closed pieces that face inward are turned, unless they are cavities;
-/// 7. unused vertices go;
-/// 8. faces that cut other faces of their own piece are smoothed, and where that does not help taken out with
-/// their
-///    neighbours and filled anew, as long as fewer faces cut each other for it. Pieces that cross each other
-///    are reported, not mended.
+/// 7. faces that cut other faces of their own piece, or that touch since step 5, are smoothed, and where that
+/// does not
+///    help taken out with their neighbours and filled anew, as long as fewer faces cut each other for it (see
+///    untangle). Pieces that cross each other are reported, not mended;
+/// 8. unused vertices go.
 ///
 /// The result is an oriented manifold; it is closed where open_holes is 0. Whatever is right is not touched:
 /// a good mesh comes back with the same bytes. Properties are kept; new faces have 0.

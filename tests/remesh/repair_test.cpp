@@ -377,6 +377,17 @@ TEST(FillHoles, TheLidOfATubeIsFlat) {
     }
 }
 
+TEST(FillHoles, AWavyRimOfAThousandEdges) {
+    // Three neighbours on a crest lie in the wall: an ear there would fold back onto it.
+    TriMesh mesh = ring_mesh(5, 1000, false, [](int r, int c) {
+        const double u = 2 * M_PI * c / 1000, far = 1 + 0.3 * std::sin(9 * u);
+        return Vec3d(far * std::cos(u), far * std::sin(u), 0.5 * r + 0.4 * std::sin(5 * u));
+    });
+    EXPECT_EQ(fill_holes(mesh, 1000).filled, 2u);
+    EXPECT_TRUE(good(mesh));
+    EXPECT_NEAR(volume(mesh), 2 * M_PI * (1 + 0.045), 1);
+}
+
 TEST(FillHoles, ChordsThatTheMeshHasElsewhereAreNotUsed) {
     // An octahedron without two neighbouring faces: the hole's one chord that is left free is the diagonal
     // across.

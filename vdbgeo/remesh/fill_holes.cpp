@@ -15,6 +15,7 @@ namespace vdbgeo {
 namespace {
 
 constexpr std::size_t exact_edges = 128;
+constexpr double ear_bend = 150 * 3.14159265358979323846 / 180;
 constexpr double fold = 172 * 3.14159265358979323846 / 180;
 
 /// A side of a hole, in the direction of the faces that will fill it.
@@ -189,7 +190,8 @@ bool clip_ear(const TriMesh& mesh, Loop& loop, const Edges& edges, const Vec3d& 
         const std::size_t next = (i + 1) % n;
         const VertexId a = loop[i].from, b = loop[i].to, c = loop[next].to;
         const Vec3d normal = normal_of(mesh, a, b, c);
-        if (normal.dot(along) <= 0 || edges.count(std::minmax(a, c))) continue;
+        const double turned = std::max(bend(normal, loop[i].normal), bend(normal, loop[next].normal));
+        if (normal.dot(along) <= 0 || turned > ear_bend || edges.count(std::minmax(a, c))) continue;
         const bool empty = std::none_of(loop.begin(), loop.end(), [&](const Side& s) {
             return s.from != a && s.from != b && s.from != c &&
                    covers(point(mesh, a), point(mesh, b), point(mesh, c), point(mesh, s.from), along);

@@ -1,6 +1,8 @@
 // vdbgeo repair: mends what can be mended in a mesh.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/mesh_command.h"
@@ -14,17 +16,36 @@ struct RepairFlags {
     RepairOptions options;
 };
 
+Json or_null(const std::optional<std::uint64_t>& count) { return count ? Json(*count) : Json(); }
+
 Json report_json(const RepairReport& r) {
     return {{"merged_vertices", r.merged_vertices},
-            {"unused_vertices", r.unused_vertices},
             {"degenerate_faces", r.degenerate_faces},
             {"duplicate_faces", r.duplicate_faces},
-            {"split_vertices", r.split_vertices},
             {"flipped_faces", r.flipped_faces},
+            {"flipped_pieces", r.flipped_pieces},
+            {"split_vertices", r.split_vertices},
             {"filled_holes", r.filled_holes},
             {"open_holes", r.open_holes},
-            {"intersecting_faces_before", r.intersecting_faces_before},
-            {"intersecting_faces_after", r.intersecting_faces_after}};
+            {"added_faces", r.added_faces},
+            {"unused_vertices", r.unused_vertices},
+            {"intersecting_faces_before", or_null(r.intersecting_faces_before)},
+            {"intersecting_faces_after", or_null(r.intersecting_faces_after)},
+            {"moved_vertices", r.moved_vertices},
+            {"refilled_faces", r.refilled_faces}};
+}
+
+void tell(const RepairReport& report, const Json& counts, Session& session) {
+    if (!session.json)
+        for (const auto& [what, count] : counts.items())
+            if (count.is_number() && count.get<std::uint64_t>() > 0) {
+                std::string words = what;
+                std::replace(words.begin(), words.end(), '_', ' ');
+                session.say(fmt::format("{:<27} {}", words, count.dump()));
+            }
+    if (report.intersecting_faces_after.value_or(0) > 0)
+        session.warn(fmt::format("{} faces still cut each other", *report.intersecting_faces_after));
+    if (report.open_holes > 0) session.warn(fmt::format("{} holes are still open", report.open_holes));
 }
 
 void run_repair(const RepairFlags& o, Session& session) {
@@ -32,14 +53,7 @@ void run_repair(const RepairFlags& o, Session& session) {
         RepairResult result = repair(work.in, o.options, work.progress);
         work.json["repaired"] = report_json(result.report);
         session.end_stage();
-        if (!session.json)
-            for (const auto& [what, count] : work.json["repaired"].items())
-                if (count.get<std::uint64_t>() > 0) session.say(fmt::format("{:<27} {}", what, count.dump()));
-        if (result.report.intersecting_faces_after > 0)
-            session.warn(
-                fmt::format("{} faces still cut each other", result.report.intersecting_faces_after));
-        if (result.report.open_holes > 0)
-            session.warn(fmt::format("{} holes are still open", result.report.open_holes));
+        tell(result.report, work.json["repaired"], session);
         return std::move(result.mesh);
     });
 }

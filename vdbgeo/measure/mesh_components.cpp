@@ -8,8 +8,10 @@
 
 #include "vdbgeo/core/disjoint_sets.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/mesh_subset.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/core/vertex_faces.h"
+#include "vdbgeo/measure/ray_bins.h"
 
 namespace vdbgeo {
 namespace {
@@ -110,92 +112,23 @@ void sort_pieces(MeshComponents& found) {
     for (std::uint32_t& id : found.of_face) id = place[id];
 }
 
-/// The places where rays along +x start, in bins over y and z.
-class RayBins {
- public:
-    RayBins(const std::vector<Vec3f>& starts) {
-        low_ = high_ = starts.front().tail<2>().cast<double>();
-        for (const Vec3f& p : starts) {
-            low_ = low_.cwiseMin(p.tail<2>().cast<double>());
-            high_ = high_.cwiseMax(p.tail<2>().cast<double>());
-        }
-        const Eigen::Vector2d extent = high_ - low_;
-        const double side = std::sqrt(static_cast<double>(starts.size()));
-        for (const int a : {0, 1}) {
-            count_[a] = std::max<std::int64_t>(1, static_cast<std::int64_t>(side));
-            scale_[a] = extent[a] > 0 ? static_cast<double>(count_[a]) / extent[a] : 0;
-        }
-        first_.assign(static_cast<std::size_t>(count_[0] * count_[1]) + 1, 0);
-        for (const Vec3f& p : starts) ++first_[bin(p) + 1];
-        std::partial_sum(first_.begin(), first_.end(), first_.begin());
-        rays_.resize(starts.size());
-        std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-        for (std::uint32_t i = 0; i < starts.size(); ++i) rays_[next[bin(starts[i])]++] = i;
-    }
-
-    /// Calls visit(ray) for the rays in the bins that a box over y and z meets.
-    template <class Visit>
-    void visit(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Visit& visit) const {
-        if ((high.array() < low_.array()).any() || (low.array() > high_.array()).any()) return;
-        for (std::int64_t z = row(low[1], 1); z <= row(high[1], 1); ++z)
-            for (std::int64_t y = row(low[0], 0); y <= row(high[0], 0); ++y) {
-                const auto b = static_cast<std::size_t>(z * count_[0] + y);
-                for (std::uint32_t i = first_[b]; i < first_[b + 1]; ++i) visit(rays_[i]);
-            }
-    }
-
- private:
-    std::int64_t row(double x, int a) const {
-        const double at = (x - low_[a]) * scale_[a];
-        return static_cast<std::int64_t>(std::clamp(at, 0.0, static_cast<double>(count_[a] - 1)));
-    }
-    std::size_t bin(const Vec3f& p) const {
-        return static_cast<std::size_t>(row(double(p.z()), 1) * count_[0] + row(double(p.y()), 0));
-    }
-
-    Eigen::Vector2d low_, high_;
-    double scale_[2];
-    std::int64_t count_[2];
-    std::vector<std::uint32_t> first_, rays_;
-};
-
-/// Twice the signed area of (a, b, p) over y and z. The products of differences of floats are exact for
-/// coordinates of like size, so the sign is.
-double turn(const Vec3d& a, const Vec3d& b, const Vec3d& p) {
-    return (b.y() - a.y()) * (p.z() - a.z()) - (b.z() - a.z()) * (p.y() - a.y());
-}
-
-/// The x at which a ray along +x from p leaves the solid behind a face; its rim belongs to the face.
-std::optional<double> leaves_at(const std::array<Vec3d, 3>& t, const Vec3d& p) {
-    const double a = turn(t[1], t[2], p), b = turn(t[2], t[0], p), c = turn(t[0], t[1], p);
-    if (a < 0 || b < 0 || c < 0 || a + b + c <= 0) return std::nullopt;
-    const double x = (a * t[0].x() + b * t[1].x() + c * t[2].x()) / (a + b + c);
-    if (x <= p.x()) return std::nullopt;
-    return x;
-}
-
 struct Hit {
     double x = std::numeric_limits<double>::infinity();
     std::uint32_t piece = none;
 };
 
+/// Where each ray from a piece first leaves a solid of another piece; of equals the lowest piece.
 std::vector<Hit> first_hits(const TriMesh& mesh, const std::vector<std::uint32_t>& of_face,
                             const std::vector<Vec3f>& starts, const std::vector<std::uint32_t>& own) {
     const RayBins bins(starts);
     std::vector<Hit> hits(starts.size());
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
-        std::array<Vec3d, 3> p;
-        for (std::size_t k = 0; k < 3; ++k) p[k] = mesh.points[mesh.triangles[f][k]].cast<double>();
-        if (turn(p[0], p[1], p[2]) <= 0) continue;
-        const Vec3d low = p[0].cwiseMin(p[1]).cwiseMin(p[2]), high = p[0].cwiseMax(p[1]).cwiseMax(p[2]);
-        bins.visit(low.tail<2>(), high.tail<2>(), [&](std::uint32_t ray) {
-            if (own[ray] == of_face[f] || high.x() <= double(starts[ray].x()) || low.x() > hits[ray].x)
-                return;
-            const std::optional<double> x = leaves_at(p, starts[ray].cast<double>());
-            if (!x || *x > hits[ray].x || (*x == hits[ray].x && of_face[f] > hits[ray].piece)) return;
-            hits[ray] = {*x, of_face[f]};
+    for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+        bins.visit(mesh, mesh.triangles[f], [&](std::uint32_t ray, const RayCrossing& crossing) {
+            const std::uint32_t piece = of_face[f];
+            Hit& hit = hits[ray];
+            if (!crossing.leaving || own[ray] == piece) return;
+            if (crossing.x < hit.x || (crossing.x == hit.x && piece < hit.piece)) hit = {crossing.x, piece};
         });
-    }
     return hits;
 }
 
@@ -239,13 +172,7 @@ std::vector<std::optional<std::uint32_t>> shells_of_cavities(const TriMesh& mesh
         cavities.push_back(id);
     }
     if (cavities.empty()) return shells;
-    std::vector<Vec3f> starts(cavities.size(), Vec3f::Constant(-std::numeric_limits<float>::infinity()));
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
-        if (ray_of[found.of_face[f]] == none) continue;
-        Vec3f& start = starts[ray_of[found.of_face[f]]];
-        for (const VertexId v : mesh.triangles[f])
-            if (mesh.points[v].x() > start.x()) start = mesh.points[v];
-    }
+    const std::vector<Vec3f> starts = farthest_in_x(mesh, found.of_face, ray_of, cavities.size());
     const std::vector<Hit> hits = first_hits(mesh, found.of_face, starts, cavities);
     // A cavity that is hit reaches further in x than the one whose ray hits it: chains end.
     std::vector<std::uint32_t> order(cavities.size());
@@ -278,41 +205,10 @@ TriMesh extract_components(const TriMesh& mesh, const MeshComponents& found, con
     if (keep.size() != found.components.size() || found.of_face.size() != mesh.triangles.size())
         throw InvalidInput(
             fmt::format("components: {} flags for {} pieces", keep.size(), found.components.size()));
-    std::vector<std::uint32_t> place(mesh.points.size(), none), faces;
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
-        if (!keep[found.of_face[f]]) continue;
-        faces.push_back(static_cast<std::uint32_t>(f));
-        for (const VertexId v : mesh.triangles[f]) place[v] = 0;
-    }
-    std::vector<std::uint32_t> vertices;
-    for (std::size_t v = 0; v < place.size(); ++v) {
-        if (place[v] == none) continue;
-        place[v] = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(static_cast<std::uint32_t>(v));
-    }
-    TriMesh kept;
-    kept.points.reserve(vertices.size());
-    for (const std::uint32_t v : vertices) kept.points.push_back(mesh.points[v]);
-    kept.triangles.reserve(faces.size());
-    for (const std::uint32_t f : faces) {
-        const Triangle& t = mesh.triangles[f];
-        kept.triangles.push_back({place[t[0]], place[t[1]], place[t[2]]});
-    }
-    const auto pick = [](const std::vector<MeshProperty>& from, const std::vector<std::uint32_t>& elements) {
-        std::vector<MeshProperty> picked;
-        for (const MeshProperty& p : from) {
-            const auto n = static_cast<std::size_t>(p.components);
-            MeshProperty q{p.name, p.components, {}};
-            q.values.reserve(n * elements.size());
-            for (const std::size_t e : elements)
-                for (std::size_t c = 0; c < n; ++c) q.values.push_back(p.values[n * e + c]);
-            picked.push_back(std::move(q));
-        }
-        return picked;
-    };
-    kept.vertex_properties = pick(mesh.vertex_properties, vertices);
-    kept.face_properties = pick(mesh.face_properties, faces);
-    return kept;
+    std::vector<std::uint32_t> faces;
+    for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+        if (keep[found.of_face[f]]) faces.push_back(static_cast<std::uint32_t>(f));
+    return pick_faces(mesh, faces);
 }
 
 TriMesh filter_components(const TriMesh& mesh, const ComponentFilter& filter, const Progress& progress) {

@@ -50,8 +50,8 @@ Sheets find_sheets(const Labels& labels, const Counts& counts) {
         out.of_edge[at] = Sheets::none;
         if (!counts(e)) continue;
         const int root = sets.root(e);
-        out.of_edge[at] = root == e ? static_cast<std::int8_t>(out.count++)
-                                    : out.of_edge[static_cast<std::size_t>(root)];
+        out.of_edge[at] =
+            root == e ? static_cast<std::int8_t>(out.count++) : out.of_edge[static_cast<std::size_t>(root)];
     }
     return out;
 }

@@ -23,8 +23,8 @@ using Vec3 = Eigen::Vector3f;
 constexpr int dim = leaf::dim;
 constexpr std::size_t chunk = 16;  // blocks a task
 
-/// What a voxel of a layer one voxel thick keeps free on each side of its centre, and how far apart the
-/// sheets of one cell stay from its middle.
+/// How far the surface goes towards the middle of a layer that is one voxel thick; how far the sheets of one
+/// cell stay from the planes through its middle, and the lines of a neck from its axis.
 constexpr float half_thickness = 0.25f, sheet_gap = 0.05f, neck = 0.15f;
 
 /// The labels of a block of 8³ cells, their corners, and a layer around.
@@ -37,7 +37,8 @@ class Samples {
     Labels cell(const Coord& c) const {
         Labels out;
         for (int k = 0; k < 8; ++k)
-            out[static_cast<std::size_t>(k)] = at(c.x() + (k & 1), c.y() + (k >> 1 & 1), c.z() + (k >> 2 & 1));
+            out[static_cast<std::size_t>(k)] =
+                at(c.x() + (k & 1), c.y() + (k >> 1 & 1), c.z() + (k >> 2 & 1));
         return out;
     }
 
@@ -96,8 +97,8 @@ struct Cell {
     VertexId first = 0;        // its first vertex: one a sheet, then two for each lower face with a neck
     std::uint32_t sheets = 0;  // two bits an edge
     std::uint8_t count = 0;
-    std::uint8_t necks = 0;         // bit a: the lower face across axis a has one
-    bool many_labels = false;       // more than two
+    std::uint8_t necks = 0;    // bit a: the lower face across axis a has one
+    bool many_labels = false;  // more than two
     VertexId neck_vertex(int axis) const {
         const int before = (necks & 1) * (axis > 0) + (necks >> 1 & 1) * (axis > 1);
         return first + count + static_cast<VertexId>(2 * before);
@@ -133,7 +134,7 @@ class Builder {
           box_(map.frame.bounded() ? CoordBBox(Coord(0), Coord(map.frame.size.x() - 1, map.frame.size.y() - 1,
                                                                map.frame.size.z() - 1))
                                    : CoordBBox::inf()),
-          max_shift_(static_cast<float>(max_shift)),
+          shift_(0.98f * static_cast<float>(max_shift)),
           progress_(progress) {
         if (!map.frame.bounded() && tree_.background() != 0)
             throw InvalidInput(fmt::format("the background of an unbounded grid of labels is {}, not 0",
@@ -144,9 +145,9 @@ class Builder {
         collect_labels();
         collect_blocks();
         for_each_block(0.1, 0.4, [&](Block& block, const Samples& s) { find_cells(block, s); });
-        blocks_.erase(std::remove_if(blocks_.begin(), blocks_.end(),
-                                     [](const Block& b) { return b.cells.empty(); }),
-                      blocks_.end());
+        blocks_.erase(
+            std::remove_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return b.cells.empty(); }),
+            blocks_.end());
         number();
         for_each_block(0.4, 1, [&](Block& block, const Samples& s) { fill(block, s); });
         for (Block& block : blocks_) {
@@ -180,8 +181,9 @@ class Builder {
 
     void add_label(float value, const Coord& at) {
         if (!(std::trunc(value) == value) || std::abs(value) > 0x1p62f)
-            throw InvalidInput(fmt::format("a map of labels holds {} at voxel ({}, {}, {}): labels are whole numbers",
-                                           value, at.x(), at.y(), at.z()));
+            throw InvalidInput(
+                fmt::format("a map of labels holds {} at voxel ({}, {}, {}): labels are whole numbers", value,
+                            at.x(), at.y(), at.z()));
         labels_.insert(value);
     }
 
@@ -218,7 +220,8 @@ class Builder {
     void collect_blocks() {
         for (auto leaf = tree_.cbeginLeaf(); leaf; ++leaf)
             for (int k = 0; k < 8; ++k)
-                origins_.push_back(leaf->origin().offsetBy(-dim * (k & 1), -dim * (k >> 1 & 1), -dim * (k >> 2)));
+                origins_.push_back(
+                    leaf->origin().offsetBy(-dim * (k & 1), -dim * (k >> 1 & 1), -dim * (k >> 2)));
         auto tile = tree_.cbeginValueAll();
         tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) {
@@ -248,7 +251,8 @@ class Builder {
             const auto at = static_cast<std::size_t>(k);
             return of.of_edge[static_cast<std::size_t>(label_cell::edge_between(q[at], q[(at + 1) % 4]))];
         };
-        if (sheet_of(sheets, 2 * axis, parts.cut[0]) != sheet_of(sheets, 2 * axis, parts.cut[1])) return false;
+        if (sheet_of(sheets, 2 * axis, parts.cut[0]) != sheet_of(sheets, 2 * axis, parts.cut[1]))
+            return false;
         const label_cell::Sheets below = label_cell::sheets(s.cell(step(c, axis, -1)));
         return sheet_of(below, 2 * axis + 1, parts.cut[0]) == sheet_of(below, 2 * axis + 1, parts.cut[1]);
     }
@@ -276,9 +280,10 @@ class Builder {
             if (const int sheet = sheets.of_edge[static_cast<std::size_t>(e)]; sheet >= 0)
                 cell.sheets |= static_cast<std::uint32_t>(sheet) << (2 * e);
         cell.count = static_cast<std::uint8_t>(sheets.count);
-        const float* other = std::find_if(labels.begin(), labels.end(), [&](float v) { return v != labels[0]; });
-        cell.many_labels = std::any_of(other, labels.end(),
-                                       [&](float v) { return v != labels[0] && v != *other; });
+        const float* other =
+            std::find_if(labels.begin(), labels.end(), [&](float v) { return v != labels[0]; });
+        cell.many_labels =
+            std::any_of(other, labels.end(), [&](float v) { return v != labels[0] && v != *other; });
         for (int a = 0; a < 3; ++a) {
             if (has_neck(s, c, a, sheets)) cell.necks |= static_cast<std::uint8_t>(1 << a);
             const label_cell::FaceParts parts = label_cell::face_parts(labels, 2 * a);
@@ -341,13 +346,14 @@ class Builder {
     }
 
     /// Vertices of the cell's sheets, and of the necks in its lower faces.
-    void place(const Coord& origin, const Coord& c, const Samples& s, const Labels& labels, const Cell& cell) {
+    void place(const Coord& origin, const Coord& c, const Samples& s, const Labels& labels,
+               const Cell& cell) {
         const Coord at = origin + c;
-        const Vec3 middle = Vec3(static_cast<float>(at.x()), static_cast<float>(at.y()),
-                                 static_cast<float>(at.z())) +
-                            Vec3::Constant(0.5f);
+        const Vec3 middle =
+            Vec3(static_cast<float>(at.x()), static_cast<float>(at.y()), static_cast<float>(at.z())) +
+            Vec3::Constant(0.5f);
         for (int sheet = 0; sheet < cell.count; ++sheet) {
-            Vec3 mean = Vec3::Zero(), low = Vec3::Constant(-max_shift_), high = Vec3::Constant(max_shift_);
+            Vec3 mean = Vec3::Zero(), low = Vec3::Constant(-shift_), high = -low;
             int edges = 0;
             for (int e = 0; e < cell::edges; ++e) {
                 if (!label_cell::crossed(labels, e) || cell.sheet(e) != sheet) continue;
@@ -480,7 +486,7 @@ class Builder {
 
     const openvdb::FloatTree& tree_;
     const CoordBBox box_;
-    const float max_shift_;
+    const float shift_;  // a little less than asked for: vertices of neighbouring cells never coincide
     const Progress progress_;
     std::set<float> labels_;
     std::vector<Coord> origins_;

@@ -410,7 +410,9 @@ DelaunayMesh SeededRun::run() {
         const bool last = round + 1 == max_rounds;
         Faults faults = compare(mesh, !last);
         if (!last) add_uncovered(mesh, faults);
-        if (getenv("VDBGEO_TRACE")) fmt::print(stderr, "round {} seeds {} vertices {} missing {} joined {} parted {} places {}\n", round, seeds.size(), mesh.points.size(), faults.missing, faults.joined, faults.parted, faults.places.size());
+        if (getenv("VDBGEO_TRACE") && round == 0) for (const Part& q : part_) fmt::print(stderr, "part {} {} {} at {} {} {}\n", q.high.x()-q.low.x(), q.high.y()-q.low.y(), q.high.z()-q.low.z(), q.low.x(), q.low.y(), q.low.z());
+        if (getenv("VDBGEO_TRACE")) for (std::size_t i = 0; i < std::min<std::size_t>(12, faults.places.size()); ++i) fmt::print(stderr, "    {:.4f} {:.4f} {:.4f} local {}\n", faults.places[i].x(), faults.places[i].y(), faults.places[i].z(), local_radius(faults.places[i]));
+        if (getenv("VDBGEO_TRACE")) fmt::print(stderr, "cpu {:.2f} round {} seeds {} vertices {} missing {} joined {} parted {} places {}\n", double(clock())/CLOCKS_PER_SEC, round, seeds.size(), mesh.points.size(), faults.missing, faults.joined, faults.parted, faults.places.size());
         if (faults.places.empty()) {
             if (!faults.components_differ()) return mesh;
             throw NumericalError(fmt::format(

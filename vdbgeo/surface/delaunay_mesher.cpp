@@ -47,8 +47,10 @@ struct VertexInfo {
 };
 
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<VertexInfo, Kernel>;
-using CellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
-using Triangulation = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using CellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel,
+                                                           CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+using Triangulation =
+    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 using Cell = Triangulation::Cell_handle;
 using Vertex = Triangulation::Vertex_handle;
 using Facet = Triangulation::Facet;
@@ -97,7 +99,8 @@ class DelaunayMesher::Impl {
         if (triangulation_.dimension() < 3) {
             insert_first(seeds);
         } else {
-            for (std::size_t i = 0; i < seeds.size(); ++i) insert(seeds[i], hint_, first_seed_ + static_cast<std::uint32_t>(i));
+            for (std::size_t i = 0; i < seeds.size(); ++i)
+                insert(seeds[i], hint_, first_seed_ + static_cast<std::uint32_t>(i));
         }
         first_seed_ += static_cast<std::uint32_t>(seeds.size());
         if (triangulation_.dimension() < 3) return;
@@ -140,18 +143,20 @@ class DelaunayMesher::Impl {
         if ((++ticks_ & 0xFF) != 0) return;
         const double vertices = static_cast<double>(triangulation_.number_of_vertices());
         if (Clock::now() > bounds_.deadline)
-            throw NumericalError(fmt::format("Delaunay refinement did not end within {:g} s, at {} vertices: try a larger "
-                                             "radius, a smaller angle, or allow more time",
-                                             bounds_.max_seconds, vertices));
+            throw NumericalError(
+                fmt::format("Delaunay refinement did not end within {:g} s, at {} vertices: try a larger "
+                            "radius, a smaller angle, or allow more time",
+                            bounds_.max_seconds, vertices));
         const double part = vertices / expected_;
         reported_ = std::max(reported_, part < 0.5 ? part : 1 - 0.25 / part);  // never quite 1
         progress_.report(reported_);
     }
     void check_vertices() const {
         if (triangulation_.number_of_vertices() >= bounds_.max_vertices)
-            throw NumericalError(fmt::format("Delaunay refinement reached the bound of {} vertices: try a larger radius, a "
-                                             "smaller angle, or allow more vertices",
-                                             bounds_.max_vertices));
+            throw NumericalError(
+                fmt::format("Delaunay refinement reached the bound of {} vertices: try a larger radius, a "
+                            "smaller angle, or allow more vertices",
+                            bounds_.max_vertices));
     }
 
     /// Where the surface parts a (inside) from b: regula falsi in the Illinois form, halving where a value is
@@ -236,8 +241,8 @@ class DelaunayMesher::Impl {
         info.version = {};
         info.level = -std::numeric_limits<double>::infinity();
         if (triangulation_.is_infinite(c)) return;
-        info.centre = circumcentre({vec(c->vertex(0)->point()), vec(c->vertex(1)->point()), vec(c->vertex(2)->point()),
-                                    vec(c->vertex(3)->point())});
+        info.centre = circumcentre({vec(c->vertex(0)->point()), vec(c->vertex(1)->point()),
+                                    vec(c->vertex(2)->point()), vec(c->vertex(3)->point())});
         info.level = level(info.centre);
     }
     void forget(Cell c) {
@@ -276,7 +281,8 @@ class DelaunayMesher::Impl {
             tick();
             check_vertices();
             const Vertex v = triangulation_.insert(points[static_cast<std::size_t>(i)], near);
-            if (v->info().seed == DelaunayMesh::no_seed) v->info().seed = first_seed_ + static_cast<std::uint32_t>(i);
+            if (v->info().seed == DelaunayMesh::no_seed)
+                v->info().seed = first_seed_ + static_cast<std::uint32_t>(i);
             near = v->cell();
         }
         if (triangulation_.dimension() < 3) return;
@@ -314,7 +320,8 @@ class DelaunayMesher::Impl {
             ++stays.first->info().version[static_cast<std::size_t>(stays.second)];
         }
         const Facet entry = in_hole(rim_.front()) ? rim_.front() : triangulation_.mirror_facet(rim_.front());
-        const Vertex v = triangulation_.insert_in_hole(p, hole_.begin(), hole_.end(), entry.first, entry.second);
+        const Vertex v =
+            triangulation_.insert_in_hole(p, hole_.begin(), hole_.end(), entry.first, entry.second);
         v->info().seed = seed;
         star_.clear();
         triangulation_.incident_cells(v, std::back_inserter(star_));
@@ -374,8 +381,8 @@ class DelaunayMesher::Impl {
     std::vector<Facet> rim_;
 };
 
-/// Inserts the centre of the largest surface ball at every edge that has not two facets and every vertex whose facets
-/// are not one disc. Whether there was one to insert.
+/// Inserts the centre of the largest surface ball at every edge that has not two facets and every vertex
+/// whose facets are not one disc. Whether there was one to insert.
 bool DelaunayMesher::Impl::refine_singular() {
     std::vector<Facet> facets;
     std::vector<Vertex> vertices;
@@ -398,7 +405,8 @@ bool DelaunayMesher::Impl::refine_singular() {
         }
         for (std::size_t k = 0; k < 3; ++k) {
             const std::uint64_t a = id[k], b = id[(k + 1) % 3];
-            sides.push_back({std::min(a, b) << 32 | std::max(a, b), static_cast<std::uint32_t>(facets.size())});
+            sides.push_back(
+                {std::min(a, b) << 32 | std::max(a, b), static_cast<std::uint32_t>(facets.size())});
         }
         facets.push_back(f);
     });
@@ -422,7 +430,8 @@ bool DelaunayMesher::Impl::refine_singular() {
         const std::uint64_t a = sides[i].ends >> 32, b = sides[i].ends & 0xFFFFFFFF;
         if (j - i == 2) {
             for (const std::uint64_t v : {a, b}) {
-                const std::uint32_t p = root(corner_at(sides[i].facet, v)), q = root(corner_at(sides[i + 1].facet, v));
+                const std::uint32_t p = root(corner_at(sides[i].facet, v)),
+                                    q = root(corner_at(sides[i + 1].facet, v));
                 parent[std::max(p, q)] = std::min(p, q);
             }
         } else {
@@ -458,13 +467,15 @@ bool DelaunayMesher::Impl::refine_singular() {
     bool any = false;
     const double least = 0.01 * bounds_.smallest;
     for (std::size_t n = 0; n < vertices.size(); ++n)
-        if (bad[n] && size[n] > least * least && insert(place[n], vertices[n]->cell(), DelaunayMesh::no_seed)) any = true;
+        if (bad[n] && size[n] > least * least && insert(place[n], vertices[n]->cell(), DelaunayMesh::no_seed))
+            any = true;
     return any;
 }
 
 bool have_delaunay_mesher() { return true; }
 
-DelaunayMesher::DelaunayMesher(const Solid& solid, const Vec3d& low, const Vec3d& high, const DelaunayBounds& bounds)
+DelaunayMesher::DelaunayMesher(const Solid& solid, const Vec3d& low, const Vec3d& high,
+                               const DelaunayBounds& bounds)
     : impl_(std::make_unique<Impl>(solid, low, high, bounds)) {}
 DelaunayMesher::~DelaunayMesher() = default;
 void DelaunayMesher::refine(const std::vector<Vec3d>& seeds, double expected, const Progress& progress) {

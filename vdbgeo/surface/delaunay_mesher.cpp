@@ -4,19 +4,24 @@
 
 #ifdef VDBGEO_HAS_CGAL
 
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Delaunay_triangulation_cell_base_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
-#include <CGAL/Mesh_triangulation_3.h>
-#include <CGAL/Random.h>
-#include <CGAL/refine_mesh_3.h>
+#include <CGAL/Exact_rational.h>
+#include <CGAL/Simple_cartesian.h>
+#include <CGAL/Spatial_sort_traits_adapter_3.h>
+#include <CGAL/Triangulation_cell_base_with_info_3.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <CGAL/spatial_sort.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <unordered_map>
+#include <queue>
 
 namespace vdbgeo {
 namespace {
@@ -28,47 +33,105 @@ using Clock = std::chrono::steady_clock;
 Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
 Point point(const Vec3d& p) { return {p.x(), p.y(), p.z()}; }
 
-/// What the queries of a run share: when to stop, and how far it is.
-struct Watch {
-    std::function<std::size_t()> vertices;
-    Clock::time_point deadline;
-    double max_seconds = 0, expected = 1;
-    Progress progress;
-    std::uint64_t queries = 0;
-    double reported = 0;
+/// A tetrahedron is in the solid where its circumcentre is.
+struct CellInfo {
+    Vec3d centre;
+    double level = -std::numeric_limits<double>::infinity();
+    std::uint32_t id = 0;
+    std::array<std::uint32_t, 4> version{};  // of what is known of its facets
+    bool inside() const { return level >= 0; }
+};
+struct VertexInfo {
+    std::uint32_t seed = DelaunayMesh::no_seed;
+    std::uint32_t number = 0;
+};
 
-    void tick() {
-        if ((++queries & 0xFFF) != 0) return;
-        if (Clock::now() > deadline)
-            throw NumericalError(fmt::format("Delaunay refinement did not end within {:g} s, at {} vertices: try a larger "
-                                             "radius, a smaller angle, or allow more time",
-                                             max_seconds, vertices()));
-        const double part = static_cast<double>(vertices()) / expected;
-        reported = std::max(reported, part < 0.5 ? part : 1 - 0.25 / part);  // never quite 1
-        progress.report(reported);
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<VertexInfo, Kernel>;
+using CellBase = CGAL::Triangulation_cell_base_with_info_3<CellInfo, Kernel,
+                                                           CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+using Triangulation =
+    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using Cell = Triangulation::Cell_handle;
+using Vertex = Triangulation::Vertex_handle;
+using Facet = Triangulation::Facet;
+
+Vec3d exact_circumcentre(const std::array<Vec3d, 4>& p) {
+    using Exact = CGAL::Simple_cartesian<CGAL::Exact_rational>;
+    const auto at = [&](std::size_t k) { return Exact::Point_3(p[k].x(), p[k].y(), p[k].z()); };
+    const Exact::Point_3 c = CGAL::circumcenter(at(0), at(1), at(2), at(3));
+    return {CGAL::to_double(c.x()), CGAL::to_double(c.y()), CGAL::to_double(c.z())};
+}
+
+Vec3d circumcentre(const std::array<Vec3d, 4>& p) {
+    const Vec3d u = p[1] - p[0], v = p[2] - p[0], w = p[3] - p[0];
+    const Vec3d vw = v.cross(w), wu = w.cross(u), uv = u.cross(v);
+    const double det = u.dot(vw), size = std::max({u.squaredNorm(), v.squaredNorm(), w.squaredNorm()});
+    // The error of det is some 1e-15 · size^1.5; six digits are enough.
+    if (!(std::abs(det) > 1e-9 * size * std::sqrt(size))) return exact_circumcentre(p);
+    return p[0] + (u.squaredNorm() * vw + v.squaredNorm() * wu + w.squaredNorm() * uv) / (2 * det);
+}
+
+/// A facet on the surface that breaks a bound. The worst of the first bound broken comes first.
+struct BadFacet {
+    double key;
+    std::uint64_t order;
+    Vec3d centre;  // of its surface ball
+    std::uint32_t cell, generation, version;
+    int index;
+    bool operator<(const BadFacet& other) const {  // the queue gives the largest first
+        return key != other.key ? key > other.key : order > other.order;
     }
 };
 
-/// The solid as Mesh_3 wants to see it: one subdomain, one surface patch, both numbered 1.
-class Domain {
- public:
-    using R = Kernel;
-    using FT = double;
-    using Point_3 = Kernel::Point_3;
-    using Vector_3 = Kernel::Vector_3;
-    using Segment_3 = Kernel::Segment_3;
-    using Ray_3 = Kernel::Ray_3;
-    using Line_3 = Kernel::Line_3;
-    using Subdomain_index = int;
-    using Surface_patch_index = int;
-    using Index = int;
-    using Subdomain = boost::optional<int>;
-    using Surface_patch = boost::optional<int>;
-    using Intersection = std::tuple<Point_3, Index, int>;
-    using Has_features = CGAL::Tag_false;
+}  // namespace
 
-    Domain(const Solid& solid, const Vec3d& low, const Vec3d& high, double tolerance, Watch& watch)
-        : solid_(solid), low_(low), high_(high), tolerance_(tolerance), watch_(watch) {}
+class DelaunayMesher::Impl {
+ public:
+    Impl(const Solid& solid, const Vec3d& low, const Vec3d& high, const DelaunayBounds& bounds)
+        : solid_(solid), low_(low), high_(high), bounds_(bounds), tolerance_(1e-5 * bounds.radius) {
+        const double s = std::sin(std::min(60.0, bounds.angle_deg) * M_PI / 180);
+        sine_squared_ = s * s;
+    }
+
+    void refine(const std::vector<Vec3d>& seeds, double expected, const Progress& progress) {
+        progress_ = progress;
+        expected_ = std::max(expected, 1.0);
+        if (triangulation_.dimension() < 3) {
+            insert_first(seeds);
+        } else {
+            for (std::size_t i = 0; i < seeds.size(); ++i)
+                insert(seeds[i], hint_, first_seed_ + static_cast<std::uint32_t>(i));
+        }
+        first_seed_ += static_cast<std::uint32_t>(seeds.size());
+        if (triangulation_.dimension() < 3) return;
+        do empty_queue();
+        while (refine_singular());
+    }
+
+    DelaunayMesh surface() const {
+        DelaunayMesh mesh;
+        for_each_facet([&](const Facet& f) {
+            Triangle t;
+            for (int k = 0; k < 3; ++k) {
+                const Vertex v = corner(f, k);
+                std::uint32_t& number = v->info().number;
+                if (number >= mesh.points.size() || mesh.points[number] != vec(v->point())) {
+                    number = static_cast<std::uint32_t>(mesh.points.size());
+                    mesh.points.push_back(vec(v->point()));
+                    mesh.seed.push_back(v->info().seed);
+                }
+                t[static_cast<std::size_t>(k)] = number;
+            }
+            mesh.triangles.push_back(t);
+        });
+        return mesh;
+    }
+
+ private:
+    struct Slot {
+        Cell cell;
+        std::uint32_t generation = 0;
+    };
 
     double level(const Vec3d& p) const {
         for (int a = 0; a < 3; ++a)
@@ -76,42 +139,29 @@ class Domain {
         return solid_(p);
     }
 
-    struct Is_in_domain {
-        const Domain& domain;
-        Subdomain operator()(const Point_3& p) const {
-            return domain.level(vec(p)) >= 0 ? Subdomain(1) : Subdomain();
-        }
-    };
-    Is_in_domain is_in_domain_object() const { return {*this}; }
+    void tick() {
+        if ((++ticks_ & 0xFF) != 0) return;
+        const double vertices = static_cast<double>(triangulation_.number_of_vertices());
+        if (Clock::now() > bounds_.deadline)
+            throw NumericalError(
+                fmt::format("Delaunay refinement did not end within {:g} s, at {} vertices: try a larger "
+                            "radius, a smaller angle, or allow more time",
+                            bounds_.max_seconds, vertices));
+        const double part = vertices / expected_;
+        reported_ = std::max(reported_, part < 0.5 ? part : 1 - 0.25 / part);  // never quite 1
+        progress_.report(reported_);
+    }
+    void check_vertices() const {
+        if (triangulation_.number_of_vertices() >= bounds_.max_vertices)
+            throw NumericalError(
+                fmt::format("Delaunay refinement reached the bound of {} vertices: try a larger radius, a "
+                            "smaller angle, or allow more vertices",
+                            bounds_.max_vertices));
+    }
 
-    struct Construct_intersection {
-        const Domain& domain;
-        Intersection operator()(const Segment_3& s) const { return domain.cross(vec(s.source()), vec(s.target())); }
-        /// The far end of a ray is outside.
-        Intersection operator()(const Ray_3& ray) const {
-            const Vec3d from = vec(ray.source());
-            const Vec3d along = vec(ray.second_point()) - from;
-            const double length = along.norm();
-            const double reach = (domain.high_ - domain.low_).norm() + (from - domain.low_).norm();
-            if (!(length > 0) || !std::isfinite(reach)) return {};
-            return domain.cross(from, from + along * (reach / length));
-        }
-        Intersection operator()(const Line_3&) const { return {}; }
-    };
-    Construct_intersection construct_intersection_object() const { return {*this}; }
-
-    Index index_from_surface_patch_index(int patch) const { return patch; }
-    Index index_from_subdomain_index(int subdomain) const { return subdomain; }
-    Surface_patch_index surface_patch_index(int index) const { return index; }
-    Subdomain_index subdomain_index(int index) const { return index; }
-    CGAL::Bbox_3 bbox() const { return {low_.x(), low_.y(), low_.z(), high_.x(), high_.y(), high_.z()}; }
-
-    /// Where the surface parts a from b: regula falsi in the Illinois form, halving where a value is infinite
-    /// or too little is gained.
-    Intersection cross(Vec3d a, Vec3d b) const {
-        watch_.tick();
-        double u = level(a), v = level(b);
-        if ((u >= 0) == (v >= 0)) return {};
+    /// Where the surface parts a (inside) from b: regula falsi in the Illinois form, halving where a value is
+    /// infinite or too little is gained.
+    Vec3d cross(Vec3d a, Vec3d b, double u, double v) const {
         int last = 0;
         for (int step = 0; step < 200; ++step) {
             const double length = (b - a).norm();
@@ -122,11 +172,8 @@ class Domain {
             t = std::min(1 - margin, std::max(margin, t));
             const Vec3d m = a + t * (b - a);
             const double w = level(m);
-            if (w == 0) {
-                a = b = m;
-                break;
-            }
-            if ((w >= 0) == (u >= 0)) {
+            if (w == 0) return m;
+            if (w > 0) {
                 a = m;
                 u = w;
                 if (last == 1) v /= 2;
@@ -138,134 +185,90 @@ class Domain {
                 last = 2;
             }
         }
-        return {point(0.5 * (a + b)), 1, 2};
+        return 0.5 * (a + b);
     }
 
- private:
-    const Solid& solid_;
-    const Vec3d low_, high_;
-    const double tolerance_;
-    Watch& watch_;
-};
-
-using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
-using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
-
-/// The bounds, as facets are tested for them: size first, then distance, shapes last.
-class FacetCriteria {
- public:
-    using Facet_quality = std::pair<int, double>;
-    using Is_facet_bad = boost::optional<Facet_quality>;
-    using Has_manifold_criterion = CGAL::Tag_true;
-
-    explicit FacetCriteria(const DelaunayBounds& bounds) : bounds_(&bounds) {
-        const double s = std::sin(std::min(60.0, bounds.angle_deg) * M_PI / 180);
-        sine_squared_ = s * s;
+    /// The centre of the surface ball of a facet, told from its cell inside.
+    Vec3d surface_centre(const Facet& f) const {
+        const Cell in = f.first, out = in->neighbor(f.second);
+        const CellInfo &a = in->info(), &b = out->info();
+        if (!triangulation_.is_infinite(out)) return cross(a.centre, b.centre, a.level, b.level);
+        const auto p = corners(f);
+        const Vec3d along = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+        const double reach = (high_ - low_).norm();  // the cell's circumcentre is in the box
+        return cross(a.centre, a.centre + reach * along, a.level, -std::numeric_limits<double>::infinity());
     }
 
-    CGAL::Mesh_facet_topology topology() const { return CGAL::FACET_VERTICES_ON_SURFACE; }
+    /// The facet's corners, counter-clockwise seen from outside its cell.
+    static Vertex corner(const Facet& f, int k) {
+        return f.first->vertex(Triangulation::vertex_triple_index(f.second, 2 - k));
+    }
+    static std::array<Vec3d, 3> corners(const Facet& f) {
+        return {vec(corner(f, 0)->point()), vec(corner(f, 1)->point()), vec(corner(f, 2)->point())};
+    }
 
-    Is_facet_bad operator()(const Triangulation&, const Triangulation::Facet& f) const {
-        std::array<Vec3d, 3> p;
-        for (std::size_t k = 0; k < 3; ++k)
-            p[k] = vec(f.first->vertex((f.second + 1 + static_cast<int>(k)) & 3)->point().point());
-        const Vec3d centre = vec(f.first->get_facet_surface_center(f.second));
-        const double local = bounds_->local_radius ? bounds_->local_radius(centre) : bounds_->radius;
+    /// Which bound the facet breaks (0 size, 1 distance, 2 angle) and how badly: 0…1, 0 worst.
+    std::optional<double> fault(const Facet& f, const Vec3d& centre) const {
+        const auto p = corners(f);
+        const double local = bounds_.local_radius ? bounds_.local_radius(centre) : bounds_.radius;
         const double ball = (p[0] - centre).squaredNorm(), radius = local * local;
-        if (ball > radius) return Facet_quality(0, radius / ball);
-        const double least = std::min(bounds_->smallest, 0.1 * local);
-        if (ball < least * least) return boost::none;
-
+        if (ball > radius) return radius / ball;
+        const double least = std::min(bounds_.smallest, 0.1 * local);
+        if (ball < least * least) return {};
         const Vec3d u = p[1] - p[0], v = p[2] - p[0], n = u.cross(v);
         const double area = n.squaredNorm();  // (2·area)²
         const double uu = u.squaredNorm(), vv = v.squaredNorm(), ww = (u - v).squaredNorm();
         const Vec3d circum = p[0] + (uu * v.cross(n) + vv * n.cross(u)) / (2 * area);
         const double off = (circum - centre).squaredNorm();
-        const double allowed = bounds_->distance * (local / bounds_->radius);
-        if (!(off <= allowed * allowed)) return Facet_quality(1, allowed * allowed / off);
+        const double allowed = bounds_.distance * (local / bounds_.radius);
+        if (!(off <= allowed * allowed)) return 1 + std::min(0.999, allowed * allowed / off);
         // sin² of the least angle = (2·area)² · the shortest side² / product of the sides²
         const double sine = area * std::min({uu, vv, ww}) / (uu * vv * ww);
-        if (!(sine >= sine_squared_)) return Facet_quality(2, sine);
-        return boost::none;
+        if (!(sine >= sine_squared_)) return 2 + sine;
+        return {};
     }
 
- private:
-    const DelaunayBounds* bounds_;
-    double sine_squared_;
-};
-
-/// Nothing is asked of the tetrahedra.
-struct CellCriteria {
-    using Cell_quality = double;
-    using Is_cell_bad = boost::optional<Cell_quality>;
-    Is_cell_bad operator()(const Triangulation&, const Triangulation::Cell_handle&) const { return boost::none; }
-};
-
-struct Criteria {
-    using Facet_criteria = FacetCriteria;
-    using Cell_criteria = CellCriteria;
-    FacetCriteria facets;
-    const FacetCriteria& facet_criteria_object() const { return facets; }
-    CellCriteria cell_criteria_object() const { return {}; }
-};
-
-}  // namespace
-
-class DelaunayMesher::Impl {
- public:
-    Impl(const Solid& solid, const Vec3d& low, const Vec3d& high, const DelaunayBounds& bounds)
-        : bounds_(bounds), domain_(solid, low, high, 1e-5 * bounds.radius, watch_) {
-        watch_.deadline = bounds.deadline;
-        watch_.max_seconds = bounds.max_seconds;
-        watch_.vertices = [this] { return complex_.triangulation().number_of_vertices(); };
-    }
-
-    void refine(const std::vector<Vec3d>& seeds, double expected, const Progress& progress) {
-        watch_.progress = progress;
-        watch_.expected = std::max(expected, 1.0);
-        CGAL::get_default_random() = CGAL::Random(0);
-        insert(seeds);
-        const Criteria criteria{FacetCriteria(bounds_)};
-        CGAL::Mesh_error_code error = CGAL::CGAL_MESH_3_NO_ERROR;
-        namespace p = CGAL::parameters;
-        p::internal::Mesh_3_options options;
-        options.maximal_number_of_vertices = bounds_.max_vertices;
-        options.pointer_to_error_code = &error;
-        CGAL::refine_mesh_3(complex_, domain_, criteria, p::no_exude(), p::no_perturb(), p::no_reset_c3t3(), options,
-                            p::manifold());
-        if (error == CGAL::CGAL_MESH_3_MAXIMAL_NUMBER_OF_VERTICES_REACHED)
-            throw NumericalError(fmt::format("Delaunay refinement reached the bound of {} vertices: try a larger radius, a "
-                                             "smaller angle, or allow more vertices",
-                                             bounds_.max_vertices));
-    }
-
-    DelaunayMesh surface() const {
-        DelaunayMesh mesh;
-        std::unordered_map<const void*, VertexId> number;
-        const auto id = [&](Triangulation::Vertex_handle v) {
-            const auto [it, fresh] = number.try_emplace(&*v, static_cast<VertexId>(mesh.points.size()));
-            if (fresh) {
-                mesh.points.push_back(vec(v->point().point()));
-                const auto seed = seed_.find(&*v);
-                mesh.seed.push_back(seed == seed_.end() ? DelaunayMesh::no_seed : seed->second);
-            }
-            return it->second;
-        };
-        for (auto f = complex_.facets_in_complex_begin(); f != complex_.facets_in_complex_end(); ++f) {
-            const bool inside = complex_.is_in_complex(f->first);
-            Triangle t;
-            for (int k = 0; k < 3; ++k)
-                t[static_cast<std::size_t>(k)] =
-                    id(f->first->vertex(Triangulation::vertex_triple_index(f->second, k)));
-            // vertex_triple_index lists a facet counter-clockwise seen from its cell's inner side.
-            if (inside) std::swap(t[1], t[2]);
-            mesh.triangles.push_back(t);
+    void set_up(Cell c) {
+        CellInfo& info = c->info();
+        if (!free_.empty()) {
+            info.id = free_.back();
+            free_.pop_back();
+        } else {
+            info.id = static_cast<std::uint32_t>(slots_.size());
+            slots_.emplace_back();
         }
-        return mesh;
+        slots_[info.id].cell = c;
+        info.version = {};
+        info.level = -std::numeric_limits<double>::infinity();
+        if (triangulation_.is_infinite(c)) return;
+        info.centre = circumcentre({vec(c->vertex(0)->point()), vec(c->vertex(1)->point()),
+                                    vec(c->vertex(2)->point()), vec(c->vertex(3)->point())});
+        info.level = level(info.centre);
+    }
+    void forget(Cell c) {
+        Slot& slot = slots_[c->info().id];
+        slot.cell = Cell();
+        ++slot.generation;
+        free_.push_back(c->info().id);
     }
 
- private:
-    void insert(const std::vector<Vec3d>& seeds) {
+    /// Looks at the facet between a cell and a neighbour, and queues it where it breaks a bound.
+    void look(Cell c, int i) {
+        const Cell n = c->neighbor(i);
+        const bool inside = c->info().inside();
+        if (inside == n->info().inside()) {
+            return;
+        }
+        const Facet f = inside ? Facet(c, i) : Facet(n, n->index(c));
+        const Vec3d centre = surface_centre(f);
+        const auto key = fault(f, centre);
+        if (!key) return;
+        CellInfo& info = f.first->info();
+        queue_.push({*key, order_++, centre, info.id, slots_[info.id].generation,
+                     info.version[static_cast<std::size_t>(f.second)], f.second});
+    }
+
+    void insert_first(const std::vector<Vec3d>& seeds) {
         std::vector<Point> points;
         points.reserve(seeds.size());
         for (const Vec3d& s : seeds) points.push_back(point(s));
@@ -273,33 +276,206 @@ class DelaunayMesher::Impl {
         std::iota(order.begin(), order.end(), std::ptrdiff_t{0});
         using Places = CGAL::Spatial_sort_traits_adapter_3<Kernel, const Point*>;
         CGAL::spatial_sort(order.begin(), order.end(), Places(points.data()));
-        auto& triangulation = complex_.triangulation();
-        Triangulation::Vertex_handle hint;
+        Cell near;
         for (const std::ptrdiff_t i : order) {
-            watch_.tick();
-            const Triangulation::Weighted_point p(points[static_cast<std::size_t>(i)]);
-            const auto v = hint == Triangulation::Vertex_handle() ? triangulation.insert(p)
-                                                                  : triangulation.insert(p, hint->cell());
-            if (v == Triangulation::Vertex_handle()) continue;  // a second seed at the same place
-            hint = v;
-            complex_.set_dimension(v, 2);
-            complex_.set_index(v, 1);
-            seed_.try_emplace(&*v, next_seed_ + static_cast<std::uint32_t>(i));
+            tick();
+            check_vertices();
+            const Vertex v = triangulation_.insert(points[static_cast<std::size_t>(i)], near);
+            if (v->info().seed == DelaunayMesh::no_seed)
+                v->info().seed = first_seed_ + static_cast<std::uint32_t>(i);
+            near = v->cell();
         }
-        next_seed_ += static_cast<std::uint32_t>(seeds.size());
+        if (triangulation_.dimension() < 3) return;
+        for (auto c = triangulation_.all_cells_begin(); c != triangulation_.all_cells_end(); ++c) {
+            tick();
+            set_up(c);
+        }
+        for (auto f = triangulation_.finite_facets_begin(); f != triangulation_.finite_facets_end(); ++f)
+            look(f->first, f->second);
+        hint_ = triangulation_.finite_vertices_begin()->cell();
     }
 
+    /// False where there is a vertex at the place already.
+    bool insert(const Vec3d& place, Cell near, std::uint32_t seed) {
+        tick();
+        check_vertices();
+        const Point p = point(place);
+        Triangulation::Locate_type type;
+        int i, j;
+        const Cell start = triangulation_.locate(p, type, i, j, near);
+        if (type == Triangulation::VERTEX) {
+            if (seed != DelaunayMesh::no_seed && start->vertex(i)->info().seed == DelaunayMesh::no_seed)
+                start->vertex(i)->info().seed = seed;
+            return false;
+        }
+        hole_.clear();
+        rim_.clear();
+        triangulation_.find_conflicts(p, start, std::back_inserter(rim_), std::back_inserter(hole_));
+        for (const Cell c : hole_) forget(c);
+        // What was known of the facets around the hole is out of date.
+        for (const Facet& f : rim_) {
+            const Facet other = triangulation_.mirror_facet(f);
+            const bool first_in_hole = slots_[f.first->info().id].cell != f.first;
+            const Facet& stays = first_in_hole ? other : f;
+            ++stays.first->info().version[static_cast<std::size_t>(stays.second)];
+        }
+        const Facet entry = in_hole(rim_.front()) ? rim_.front() : triangulation_.mirror_facet(rim_.front());
+        const Vertex v =
+            triangulation_.insert_in_hole(p, hole_.begin(), hole_.end(), entry.first, entry.second);
+        v->info().seed = seed;
+        star_.clear();
+        triangulation_.incident_cells(v, std::back_inserter(star_));
+        for (const Cell c : star_) set_up(c);
+        for (const Cell c : star_)
+            for (int k = 0; k < 4; ++k) {
+                if (triangulation_.is_infinite(c, k)) continue;
+                const Cell n = c->neighbor(k);
+                // Facets between two cells of the star are seen from one of them.
+                if (c->vertex(k) == v || c->info().id < n->info().id) look(c, k);
+            }
+        hint_ = v->cell();
+        return true;
+    }
+    bool in_hole(const Facet& f) const { return slots_[f.first->info().id].cell != f.first; }
+
+    void empty_queue() {
+        while (!queue_.empty()) {
+            const BadFacet bad = queue_.top();
+            queue_.pop();
+            const Slot& slot = slots_[bad.cell];
+            if (slot.generation != bad.generation || slot.cell == Cell() ||
+                slot.cell->info().version[static_cast<std::size_t>(bad.index)] != bad.version)
+                continue;
+            insert(bad.centre, slot.cell, DelaunayMesh::no_seed);
+        }
+    }
+
+    /// Calls visit(facet told from its cell inside) for all facets on the surface.
+    template <class Visit>
+    void for_each_facet(const Visit& visit) const {
+        if (triangulation_.dimension() < 3) return;
+        for (auto c = triangulation_.finite_cells_begin(); c != triangulation_.finite_cells_end(); ++c) {
+            if (!c->info().inside()) continue;
+            for (int i = 0; i < 4; ++i)
+                if (!c->neighbor(i)->info().inside()) visit(Facet(c, i));
+        }
+    }
+
+    bool refine_singular();
+
+    const Solid& solid_;
+    const Vec3d low_, high_;
     const DelaunayBounds bounds_;
-    Watch watch_;
-    Domain domain_;
-    Complex complex_;
-    std::unordered_map<const void*, std::uint32_t> seed_;
-    std::uint32_t next_seed_ = 0;
+    const double tolerance_;
+    double sine_squared_;
+    Progress progress_;
+    double expected_ = 1, reported_ = 0;
+    std::uint64_t ticks_ = 0, order_ = 0;
+    std::uint32_t first_seed_ = 0;
+    Triangulation triangulation_;
+    std::vector<Slot> slots_;
+    std::vector<std::uint32_t> free_;
+    std::priority_queue<BadFacet> queue_;
+    Cell hint_;
+    std::vector<Cell> hole_, star_;
+    std::vector<Facet> rim_;
 };
+
+/// Inserts the centre of the largest surface ball at every edge that has not two facets and every vertex
+/// whose facets are not one disc. Whether there was one to insert.
+bool DelaunayMesher::Impl::refine_singular() {
+    std::vector<Facet> facets;
+    std::vector<Vertex> vertices;
+    struct Side {
+        std::uint64_t ends;
+        std::uint32_t facet;
+        bool operator<(const Side& o) const { return ends != o.ends ? ends < o.ends : facet < o.facet; }
+    };
+    std::vector<Side> sides;
+    for_each_facet([&](const Facet& f) {
+        std::array<std::uint64_t, 3> id;
+        for (int k = 0; k < 3; ++k) {
+            const Vertex v = corner(f, k);
+            std::uint32_t& number = v->info().number;
+            if (number >= vertices.size() || vertices[number] != v) {
+                number = static_cast<std::uint32_t>(vertices.size());
+                vertices.push_back(v);
+            }
+            id[static_cast<std::size_t>(k)] = number;
+        }
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint64_t a = id[k], b = id[(k + 1) % 3];
+            sides.push_back(
+                {std::min(a, b) << 32 | std::max(a, b), static_cast<std::uint32_t>(facets.size())});
+        }
+        facets.push_back(f);
+    });
+    std::sort(sides.begin(), sides.end());
+    // The corners of the facets, joined across the edges of two facets: one class a vertex is one disc.
+    std::vector<std::uint32_t> parent(3 * facets.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t c) {
+        while (parent[c] != c) c = parent[c] = parent[parent[c]];
+        return c;
+    };
+    const auto corner_at = [&](std::uint32_t f, std::uint64_t vertex) {
+        std::uint32_t k = 0;
+        while (corner(facets[f], static_cast<int>(k))->info().number != vertex) ++k;
+        return 3 * f + k;
+    };
+    std::vector<char> bad(vertices.size(), 0);
+    for (std::size_t i = 0; i < sides.size();) {
+        std::size_t j = i;
+        while (j < sides.size() && sides[j].ends == sides[i].ends) ++j;
+        const std::uint64_t a = sides[i].ends >> 32, b = sides[i].ends & 0xFFFFFFFF;
+        if (j - i == 2) {
+            for (const std::uint64_t v : {a, b}) {
+                const std::uint32_t p = root(corner_at(sides[i].facet, v)),
+                                    q = root(corner_at(sides[i + 1].facet, v));
+                parent[std::max(p, q)] = std::min(p, q);
+            }
+        } else {
+            bad[a] = bad[b] = 1;
+        }
+        i = j;
+    }
+    std::vector<std::uint32_t> disc(vertices.size(), 0xFFFFFFFF);
+    for (std::uint32_t f = 0; f < facets.size(); ++f)
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const std::uint32_t v = corner(facets[f], static_cast<int>(k))->info().number;
+            const std::uint32_t r = root(3 * f + k);
+            if (disc[v] == 0xFFFFFFFF) disc[v] = r;
+            if (disc[v] != r) bad[v] = 1;
+        }
+    // The largest ball at each bad vertex.
+    std::vector<double> size(vertices.size(), 0);
+    std::vector<Vec3d> place(vertices.size());
+    for (const Facet& f : facets) {
+        std::optional<Vec3d> centre;
+        for (int k = 0; k < 3; ++k) {
+            const Vertex v = corner(f, k);
+            const std::uint32_t n = v->info().number;
+            if (!bad[n]) continue;
+            if (!centre) centre = surface_centre(f);
+            const double ball = (vec(v->point()) - *centre).squaredNorm();
+            if (ball > size[n]) {
+                size[n] = ball;
+                place[n] = *centre;
+            }
+        }
+    }
+    bool any = false;
+    const double least = 0.01 * bounds_.smallest;
+    for (std::size_t n = 0; n < vertices.size(); ++n)
+        if (bad[n] && size[n] > least * least && insert(place[n], vertices[n]->cell(), DelaunayMesh::no_seed))
+            any = true;
+    return any;
+}
 
 bool have_delaunay_mesher() { return true; }
 
-DelaunayMesher::DelaunayMesher(const Solid& solid, const Vec3d& low, const Vec3d& high, const DelaunayBounds& bounds)
+DelaunayMesher::DelaunayMesher(const Solid& solid, const Vec3d& low, const Vec3d& high,
+                               const DelaunayBounds& bounds)
     : impl_(std::make_unique<Impl>(solid, low, high, bounds)) {}
 DelaunayMesher::~DelaunayMesher() = default;
 void DelaunayMesher::refine(const std::vector<Vec3d>& seeds, double expected, const Progress& progress) {

@@ -45,19 +45,20 @@ struct DelaunayMesh {
 /// Whether this build has CGAL.
 bool have_delaunay_mesher();
 
-/// Boissonnat & Oudot 2005 (doi:10.1016/j.gmod.2005.01.004): the facets of the Delaunay triangulation whose dual
-/// edges cross the surface, refined until their angles, their surface balls' radii and the distances from their
-/// circumcentres to those balls' centres are within the bounds and every vertex has a disc of facets around it
-/// (CGAL's Mesh_3, sequential, so that a run repeats to the last bit). The surface is the boundary of the
-/// tetrahedra whose circumcentres lie inside: closed, and without self-intersections.
+/// Boissonnat & Oudot 2005 (doi:10.1016/j.gmod.2005.01.004): the facets of the Delaunay triangulation whose
+/// dual edges cross the surface, refined until their angles, their surface balls' radii and the distances
+/// from their circumcentres to those balls' centres are within the bounds and every vertex has a disc of
+/// facets around it (CGAL's Mesh_3, sequential, so that a run repeats to the last bit). The surface is the
+/// boundary of the tetrahedra whose circumcentres lie inside: closed, and without self-intersections.
 class DelaunayMesher {
  public:
     /// Throws InvalidInput where this build has no CGAL. `low` and `high` hold the solid between them.
     DelaunayMesher(const Solid& solid, const Vec3d& low, const Vec3d& high, const DelaunayBounds& bounds);
     ~DelaunayMesher();
 
-    /// Adds points on the surface, which get the next numbers, and refines. Parts of the surface where no seed
-    /// was ever near may be missed. `expected` vertices are 1 for the progress. Throws NumericalError at a cap.
+    /// Adds points on the surface, which get the next numbers, and refines. Parts of the surface where no
+    /// seed was ever near may be missed. `expected` vertices are 1 for the progress. Throws NumericalError at
+    /// a cap.
     void refine(const std::vector<Vec3d>& seeds, double expected, const Progress& progress);
 
     DelaunayMesh surface() const;

@@ -61,8 +61,8 @@ std::vector<Vec3d> border_seeds(const Frame& frame, const MapSolid& solid, doubl
                     index[b] = (i + 0.5 + 0.25 * (j % 2 ? 1 : -1)) * (frame.size[b] - 1) / nb;
                     index[c] = (j + 0.5) * (frame.size[c] - 1) / nc;
                     const Vec3d p = solid.from_world(frame.to_world(index));
-                    const Vec3d in = solid.from_world(frame.to_world(
-                        index + (side ? -1e-3 : 1e-3) * Vec3d::Unit(axis)));
+                    const Vec3d in =
+                        solid.from_world(frame.to_world(index + (side ? -1e-3 : 1e-3) * Vec3d::Unit(axis)));
                     if (solid(in) >= 0) seeds.push_back(p);
                 }
         }
@@ -78,16 +78,20 @@ void DelaunaySurfaceOptions::check() const {
     if (!(radius >= 0.01 && radius <= 1000))
         throw InvalidInput(fmt::format("the radius bound is {:g} voxels: 0.01 to 1000 are possible", radius));
     if (!(distance >= 0.001 && distance <= 1000))
-        throw InvalidInput(fmt::format("the distance bound is {:g} voxels: 0.001 to 1000 are possible", distance));
+        throw InvalidInput(
+            fmt::format("the distance bound is {:g} voxels: 0.001 to 1000 are possible", distance));
     if (max_vertices < 4 || max_vertices > TriMesh::max_vertices)
-        throw InvalidInput(fmt::format("the bound on vertices is {}: 4 to 2^32 - 1 are possible", max_vertices));
+        throw InvalidInput(
+            fmt::format("the bound on vertices is {}: 4 to 2^32 - 1 are possible", max_vertices));
     if (!(max_seconds > 0 && max_seconds <= 1e8))
-        throw InvalidInput(fmt::format("the bound on time is {:g} s: above 0 and up to 1e8 are possible", max_seconds));
+        throw InvalidInput(
+            fmt::format("the bound on time is {:g} s: above 0 and up to 1e8 are possible", max_seconds));
 }
 
 bool have_delaunay() { return have_delaunay_mesher(); }
 
-TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& options, const Progress& progress) {
+TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& options,
+                         const Progress& progress) {
     options.check();
     if (!have_delaunay()) throw InvalidInput("Delaunay surfaces need CGAL, which this build does not have");
     MarchingCubesOptions cubes;
@@ -102,7 +106,8 @@ TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& op
     if (map.frame.bounded())
         for (int corner = 0; corner < 8; ++corner) {
             const Vec3d last = (map.frame.size - Vec3i::Ones()).cast<double>();
-            const Vec3d p = map.frame.to_world({corner & 1 ? last.x() : 0, corner & 2 ? last.y() : 0, corner & 4 ? last.z() : 0});
+            const Vec3d p = map.frame.to_world(
+                {corner & 1 ? last.x() : 0, corner & 2 ? last.y() : 0, corner & 4 ? last.z() : 0});
             low = low.cwiseMin(p);
             high = high.cwiseMax(p);
         }
@@ -117,10 +122,12 @@ TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& op
     if (solid.turned())
         for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
 
-    const SeededBounds bounds{options.angle_deg, options.radius, options.distance, options.max_vertices, options.max_seconds};
+    const SeededBounds bounds{options.angle_deg, options.radius, options.distance, options.max_vertices,
+                              options.max_seconds};
     const Vec3d margin = Vec3d::Constant(2);
-    const DelaunayMesh found = seeded_delaunay(solid, solid.from_world(low) - margin, solid.from_world(high) + margin, mesh,
-                                               bounds, progress.part(0.05, 1));
+    const DelaunayMesh found =
+        seeded_delaunay(solid, solid.from_world(low) - margin, solid.from_world(high) + margin, mesh, bounds,
+                        progress.part(0.05, 1));
     TriMesh out;
     for (const Vec3d& p : found.points) out.points.push_back(solid.to_world(p).cast<float>());
     for (Triangle t : found.triangles) {

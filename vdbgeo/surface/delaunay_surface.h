@@ -14,7 +14,8 @@ struct DelaunaySurfaceOptions {
     double isovalue = 0;
     double angle_deg = 30;  ///< least angle of a triangle; up to 30 the refinement is sure to end
     double radius = 0.8;    ///< largest radius of a triangle's surface Delaunay ball, in voxels
-    double distance = 0.8;  ///< largest distance from a triangle's circumcentre to its ball's centre, in voxels
+    double distance =
+        0.8;  ///< largest distance from a triangle's circumcentre to its ball's centre, in voxels
     std::uint64_t max_vertices = 20'000'000;
     double max_seconds = 3600;
 

@@ -13,8 +13,10 @@
 namespace vdbgeo {
 namespace {
 
-constexpr int max_rounds = 9;
-constexpr double seed_spacing = 1.2;     // in radius bounds
+constexpr int max_rounds = 5;
+constexpr double thinnest = 1.0 / 64;     // in radius bounds, that is followed
+constexpr std::size_t max_thin = 200000;  // points a round
+constexpr double seed_spacing = 1.2;      // in radius bounds
 constexpr double small_component = 0.15;  // its radius bound, in its diagonals
 
 /// Numbers kept by the cube of space they are in.
@@ -25,7 +27,8 @@ class SpaceHash {
     using Cell = std::array<std::int64_t, 3>;
     Cell cell(const Vec3d& p) const {
         Cell c;
-        for (int a = 0; a < 3; ++a) c[static_cast<std::size_t>(a)] = static_cast<std::int64_t>(std::floor(p[a] * scale_));
+        for (int a = 0; a < 3; ++a)
+            c[static_cast<std::size_t>(a)] = static_cast<std::int64_t>(std::floor(p[a] * scale_));
         return c;
     }
     void add(const Vec3d& p, std::uint32_t number) { cells_[cell(p)].push_back(number); }
@@ -57,8 +60,8 @@ class SpaceHash {
     std::unordered_map<Cell, std::vector<std::uint32_t>, Hash> cells_;
 };
 
-/// The component of each point, numbered in the order of the points; unused points get numbers of their own after
-/// all others.
+/// The component of each point, numbered in the order of the points; unused points get numbers of their own
+/// after all others.
 struct Components {
     std::vector<std::uint32_t> of_point;
     std::uint32_t count = 0;
@@ -128,7 +131,8 @@ class SeededRun {
     };
     struct Faults {
         std::uint64_t missing = 0, joined = 0, parted = 0;
-        std::vector<Vec3d> places;
+        std::vector<Vec3d> places;       // to be seeded denser
+        std::vector<Vec3d> thin_places;  // where the surface is joined or parted
         bool components_differ() const { return missing + joined + parted > 0; }
     };
 
@@ -137,27 +141,31 @@ class SeededRun {
         out.angle_deg = bounds_.angle_deg;
         out.radius = bounds_.radius;
         out.distance = bounds_.distance;
-        out.smallest = bounds_.radius / 32;
+        out.smallest = bounds_.radius / 512;
         out.max_vertices = bounds_.max_vertices;
         out.max_seconds = bounds_.max_seconds;
-        out.deadline = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                                                              std::chrono::duration<double>(bounds_.max_seconds));
+        out.deadline = std::chrono::steady_clock::now() +
+                       std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                           std::chrono::duration<double>(bounds_.max_seconds));
         out.local_radius = [this](const Vec3d& p) { return local_radius(p); };
         return out;
     }
 
+    /// The bound at a place: it grows by a radius a radius away from the spots.
     double local_radius(const Vec3d& p) const {
         double radius = bounds_.radius;
         if (spots_.empty()) return radius;
         fine_.near(p, [&](std::uint32_t n) {
             const Spot& spot = spots_[n];
-            if (spot.radius < radius && (spot.place - p).squaredNorm() < bounds_.radius * bounds_.radius)
-                radius = spot.radius;
+            const double room = radius - spot.radius;
+            const double d = (spot.place - p).squaredNorm();
+            if (room > 0 && d < room * room) radius = spot.radius + std::sqrt(d);
             return false;
         });
         return radius;
     }
     void add_spot(const Vec3d& place, double radius) {
+        if (local_radius(place) < 1.25 * radius) return;
         fine_.add(place, static_cast<std::uint32_t>(spots_.size()));
         spots_.push_back({place, radius});
     }
@@ -169,7 +177,9 @@ class SeededRun {
     std::vector<Vec3d> make_seeds(const Wanted& wanted);
     Faults compare(const DelaunayMesh& mesh, bool places) const;
     void add_uncovered(const DelaunayMesh& mesh, Faults& faults) const;
-    std::vector<Vec3d> densify(const std::vector<Vec3d>& places);
+    double thickness(const Vec3d& p, const Vec3d& normal) const;
+    void follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, int depth);
+    std::vector<Vec3d> densify(const Faults& faults);
     double expected_vertices() const;
 
     const Solid& solid_;
@@ -181,6 +191,7 @@ class SeededRun {
     std::vector<std::uint32_t> seed_part_;  // of every seed so far; an extra seed has none
     SpaceHash fine_;
     std::vector<Spot> spots_;
+    std::vector<std::pair<Vec3d, Vec3d>> thin_;  // points of thin parts, with their normals
     DelaunayMesher mesher_;
 };
 
@@ -222,14 +233,15 @@ void SeededRun::find_open_components() {
     }
 }
 
-/// The point of the surface on the normal through a face's centre, or one of the face's corners where it is not
-/// within half a radius bound. (Corners lie on the lattice's edges, many in one plane: bad for exact predicates.)
+/// The point of the surface on the normal through a face's centre, or one of the face's corners where it is
+/// not within half a radius bound. (Corners lie on the lattice's edges, many in one plane: bad for exact
+/// predicates.)
 Vec3d SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3d& fallback) const {
     const double start = solid_(centre);
     const bool inside = start >= 0;
     const Vec3d out = inside ? normal : Vec3d(-normal);
     double near = 0, far = 0;
-    for (double reach = bounds_.radius / 64; reach < 0.6 * bounds_.radius; reach *= 2) {
+    for (double reach = bounds_.radius / 1024; reach < 0.6 * bounds_.radius; reach *= 2) {
         if ((solid_(centre + reach * out) >= 0) != inside) {
             far = reach;
             break;
@@ -244,8 +256,8 @@ Vec3d SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3
     return centre + 0.5 * (near + far) * out;
 }
 
-/// Seeds on the faces that are wanted, none nearer than the spacing to another of the same component that faces the
-/// same way.
+/// Seeds on the faces that are wanted, none nearer than the spacing to another of the same component that
+/// faces the same way.
 template <class Wanted>
 std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
     struct Seed {
@@ -259,12 +271,15 @@ std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
         const std::uint32_t part = parts_.of_point[t[0]];
         const Vec3d centre = (a + b + c) / 3;
         if (!wanted(centre)) continue;
-        const double spacing = seed_spacing * std::min(part_[part].radius, local_radius(centre));
+        const bool small = part_[part].radius < bounds_.radius;
+        const double spacing =
+            (small ? 0.5 : 1) * seed_spacing * std::min(part_[part].radius, local_radius(centre));
         const Vec3d normal = (b - a).cross(c - a).normalized();
         if (!normal.allFinite()) continue;
         const bool taken = hash.near(centre, [&](std::uint32_t n) {
             const Seed& s = seeds[n];
-            return s.part == part && (s.place - centre).squaredNorm() < spacing * spacing && s.normal.dot(normal) > 0;
+            return s.part == part && (s.place - centre).squaredNorm() < spacing * spacing &&
+                   s.normal.dot(normal) > 0;
         });
         if (taken) continue;
         const Vec3d place = on_surface(centre, normal, a);
@@ -295,7 +310,7 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
         note(there[part], got.of_point[v]);
         note(here[got.of_point[v]], part);
     }
-    std::vector<char> wrong(parts_.count, 0);   // components of the reference to seed denser all over
+    std::vector<char> wrong(parts_.count, 0);  // components of the reference to seed denser all over
     std::vector<char> parted(parts_.count, 0), joined(got.count, 0);
     for (std::uint32_t p = 0; p < parts_.count; ++p) {
         if (there[p].empty()) {
@@ -308,7 +323,8 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
     }
     for (std::uint32_t g = 0; g < got.count; ++g) {
         if (here[g].size() < 2) continue;
-        const auto closed = std::count_if(here[g].begin(), here[g].end(), [&](std::uint32_t p) { return !part_[p].open; });
+        const auto closed =
+            std::count_if(here[g].begin(), here[g].end(), [&](std::uint32_t p) { return !part_[p].open; });
         if (closed == 0) continue;
         ++faults.joined;
         joined[g] = 1;
@@ -318,7 +334,8 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
     const double reach = bounds_.radius;
     SpaceHash vertices(reach), points(reach);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
-    const auto nearest = [&](const SpaceHash& hash, const Vec3d& p, const auto& at, const auto& of, const auto& among) {
+    const auto nearest = [&](const SpaceHash& hash, const Vec3d& p, const auto& at, const auto& of,
+                             const auto& among) {
         double best = std::numeric_limits<double>::infinity();
         std::uint32_t label = DelaunayMesh::no_seed;
         hash.near(p, [&](std::uint32_t n) {
@@ -341,20 +358,22 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
             const std::uint32_t p = parts_.of_point[v];
             if (any_joined) points.add(reference_.points[v], v);
             if (wrong[p]) faults.places.push_back(reference_.points[v]);
-            if (parted[p]) label[v] = nearest(vertices, reference_.points[v], mesh.points, got.of_point, there[p]);
+            if (parted[p])
+                label[v] = nearest(vertices, reference_.points[v], mesh.points, got.of_point, there[p]);
         }
     for (const Triangle& t : reference_.triangles)
         if (parted[parts_.of_point[t[0]]] && (label[t[0]] != label[t[1]] || label[t[0]] != label[t[2]]))
-            faults.places.push_back(reference_.points[t[0]]);
+            faults.thin_places.push_back(reference_.points[t[0]]);
     if (!any_joined) return faults;
     label.assign(mesh.points.size(), DelaunayMesh::no_seed);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) {
         const std::uint32_t g = got.of_point[v];
-        if (joined[g]) label[v] = nearest(points, mesh.points[v], reference_.points, parts_.of_point, here[g]);
+        if (joined[g])
+            label[v] = nearest(points, mesh.points[v], reference_.points, parts_.of_point, here[g]);
     }
     for (const Triangle& t : mesh.triangles)
         if (joined[got.of_point[t[0]]] && (label[t[0]] != label[t[1]] || label[t[0]] != label[t[2]]))
-            for (const VertexId v : t) faults.places.push_back(mesh.points[v]);
+            faults.thin_places.push_back(mesh.points[t[0]]);
     return faults;
 }
 
@@ -370,20 +389,87 @@ void SeededRun::add_uncovered(const DelaunayMesh& mesh, Faults& faults) const {
     }
 }
 
-/// Halves the radius bound around the places and seeds there.
-std::vector<Vec3d> SeededRun::densify(const std::vector<Vec3d>& places) {
-    SpaceHash hash(bounds_.radius);
-    std::vector<double> half;
-    for (std::uint32_t i = 0; i < places.size(); ++i) {
-        hash.add(places[i], i);
-        half.push_back(0.5 * local_radius(places[i]));
+/// How thick the solid, or the gap outside, is at a point of its surface; nothing where that is more than a
+/// radius.
+double SeededRun::thickness(const Vec3d& p, const Vec3d& normal) const {
+    for (double s = 0.5 * thinnest * bounds_.radius; s < bounds_.radius; s *= 1.3)
+        if (solid_(p - s * normal) < 0 || solid_(p + s * normal) >= 0) return s;
+    return bounds_.radius;
+}
+
+/// The bound follows the thickness over a face, which is split until its parts are as small as the bound
+/// asks.
+void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, int depth) {
+    const Vec3d flat = (b - a).cross(c - a).normalized(), centre = (a + b + c) / 3;
+    if (!flat.allFinite() || thin_.size() > max_thin) return;
+    const Vec3d nowhere = Vec3d::Constant(std::numeric_limits<double>::infinity());
+    const Vec3d p = on_surface(centre, flat, nowhere);
+    const bool found = p.allFinite();
+    const double h = 1e-3 * thinnest * bounds_.radius;
+    Vec3d normal = -Vec3d(solid_(p + h * Vec3d::UnitX()) - solid_(p - h * Vec3d::UnitX()),
+                          solid_(p + h * Vec3d::UnitY()) - solid_(p - h * Vec3d::UnitY()),
+                          solid_(p + h * Vec3d::UnitZ()) - solid_(p - h * Vec3d::UnitZ()))
+                        .normalized();
+    if (!normal.allFinite()) normal = flat;
+    const double size = found
+                            ? std::max(thinnest, 0.5 * thickness(p, normal) / bounds_.radius) * bounds_.radius
+                            : bounds_.radius / 8;
+    if (found && size < 0.3 * bounds_.radius) {
+        add_spot(p, size);
+        thin_.emplace_back(p, normal);
     }
-    for (std::size_t i = 0; i < places.size(); ++i) add_spot(places[i], half[i]);
-    return make_seeds([&](const Vec3d& p) {
-        return hash.near(p, [&](std::uint32_t n) {
-            return (places[n] - p).squaredNorm() < bounds_.radius * bounds_.radius;
-        });
-    });
+    const std::array<const Vec3d*, 3> at = {&a, &b, &c};
+    std::size_t longest = 0;
+    const auto length = [&](std::size_t k) { return (*at[k] - *at[(k + 1) % 3]).norm(); };
+    for (std::size_t k = 1; k < 3; ++k)
+        if (length(k) > length(longest)) longest = k;
+    if (depth == 0 || length(longest) < 1.5 * size) return;
+    const Vec3d &u = *at[longest], &v = *at[(longest + 1) % 3], &w = *at[(longest + 2) % 3],
+                m = 0.5 * (u + v);
+    follow_thickness(u, m, w, depth - 1);
+    follow_thickness(m, v, w, depth - 1);
+}
+
+/// Lowers the radius bound: around the places by half, around the thin ones to a part of the thickness there.
+/// Seeds for both.
+std::vector<Vec3d> SeededRun::densify(const Faults& faults) {
+    struct Near {
+        const std::vector<Vec3d>& places;
+        double reach;
+        SpaceHash hash;
+        Near(const std::vector<Vec3d>& of, double r) : places(of), reach(r), hash(r) {
+            for (std::uint32_t i = 0; i < places.size(); ++i) hash.add(places[i], i);
+        }
+        bool operator()(const Vec3d& p) const {
+            return hash.near(p,
+                             [&](std::uint32_t n) { return (places[n] - p).squaredNorm() < reach * reach; });
+        }
+    };
+    std::vector<double> half;
+    for (const Vec3d& p : faults.places)
+        half.push_back(std::max(0.5 * local_radius(p), bounds_.radius / 512));
+    const Near thin(faults.thin_places, bounds_.radius), place(faults.places, bounds_.radius);
+    thin_.clear();
+    for (const Triangle& t : reference_.triangles) {
+        const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
+        if (!faults.thin_places.empty() && thin((a + b + c) / 3)) follow_thickness(a, b, c, 8);
+    }
+    for (std::size_t i = 0; i < faults.places.size(); ++i) add_spot(faults.places[i], half[i]);
+    std::vector<Vec3d> seeds = make_seeds(place);
+    SpaceHash taken(bounds_.radius);
+    for (std::uint32_t i = 0; i < thin_.size(); ++i) {
+        const auto& [p, normal] = thin_[i];
+        const double spacing = seed_spacing * local_radius(p);
+        if (taken.near(p, [&](std::uint32_t n) {
+                return (thin_[n].first - p).squaredNorm() < spacing * spacing &&
+                       thin_[n].second.dot(normal) > 0;
+            }))
+            continue;
+        taken.add(p, i);
+        seeds.push_back(p);
+        seed_part_.push_back(DelaunayMesh::no_seed);
+    }
+    return seeds;
 }
 
 /// From the area: what is left where the facets' radius is the bound.
@@ -410,22 +496,23 @@ DelaunayMesh SeededRun::run() {
         const bool last = round + 1 == max_rounds;
         Faults faults = compare(mesh, !last);
         if (!last) add_uncovered(mesh, faults);
-        if (getenv("VDBGEO_TRACE")) fmt::print(stderr, "round {} seeds {} vertices {} missing {} joined {} parted {} places {}\n", round, seeds.size(), mesh.points.size(), faults.missing, faults.joined, faults.parted, faults.places.size());
-        if (faults.places.empty()) {
-            if (!faults.components_differ()) return mesh;
-            throw NumericalError(fmt::format(
-                "of {} components of the surface, Delaunay refinement missed {}, joined {} with others and split {}: "
-                "try a smaller radius, or another isovalue",
-                parts_.count, faults.missing, faults.joined, faults.parted));
+        if (faults.places.empty() && faults.thin_places.empty()) {
+            if (faults.missing == 0) return mesh;
+            throw NumericalError(
+                fmt::format("of {} components of the surface, Delaunay refinement missed {}, joined {} with "
+                            "others and split {}: "
+                            "try a smaller radius, or another isovalue",
+                            parts_.count, faults.missing, faults.joined, faults.parted));
         }
-        seeds = densify(faults.places);
+        seeds = densify(faults);
     }
 }
 
 }  // namespace
 
-DelaunayMesh seeded_delaunay(const Solid& solid, const Vec3d& low, const Vec3d& high, const ReferenceMesh& reference,
-                             const SeededBounds& bounds, const Progress& progress) {
+DelaunayMesh seeded_delaunay(const Solid& solid, const Vec3d& low, const Vec3d& high,
+                             const ReferenceMesh& reference, const SeededBounds& bounds,
+                             const Progress& progress) {
     return SeededRun(solid, low, high, reference, bounds, progress).run();
 }
 

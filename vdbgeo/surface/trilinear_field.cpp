@@ -11,8 +11,11 @@ using leaf::LowerNode;
 using openvdb::Coord;
 
 std::size_t hash(const Coord& c, int bits) {
-    const auto part = [&](int a) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c[a] >> bits)); };
-    std::uint64_t h = part(0) * 0x9E3779B97F4A7C15ull ^ part(1) * 0xC2B2AE3D27D4EB4Full ^ part(2) * 0x165667B19E3779F9ull;
+    const auto part = [&](int a) {
+        return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c[a] >> bits));
+    };
+    std::uint64_t h =
+        part(0) * 0x9E3779B97F4A7C15ull ^ part(1) * 0xC2B2AE3D27D4EB4Full ^ part(2) * 0x165667B19E3779F9ull;
     return static_cast<std::size_t>(h ^ h >> 29);
 }
 
@@ -56,7 +59,8 @@ const TrilinearField::Node* TrilinearField::find(const Coord& c) const {
 double TrilinearField::value(const Coord& c) const {
     const Node* node = find(c);
     if (!node) return static_cast<double>(tree_->getValue(c));
-    const auto b = static_cast<std::size_t>(((c[0] >> 3 & 15) << 8) | ((c[1] >> 3 & 15) << 4) | (c[2] >> 3 & 15));
+    const auto b =
+        static_cast<std::size_t>(((c[0] >> 3 & 15) << 8) | ((c[1] >> 3 & 15) << 4) | (c[2] >> 3 & 15));
     const float* in = node->samples[b];
     return static_cast<double>(in ? in[leaf::offset(c[0] & 7, c[1] & 7, c[2] & 7)] : node->tile[b]);
 }
@@ -66,7 +70,8 @@ TrilinearField::Corners TrilinearField::corners(const Coord& c) const {
     Corners d;
     if ((c[0] & 7) < 7 && (c[1] & 7) < 7 && (c[2] & 7) < 7) {  // two cells of three lie in one leaf
         const Node* node = find(c);
-        const auto b = static_cast<std::size_t>(((c[0] >> 3 & 15) << 8) | ((c[1] >> 3 & 15) << 4) | (c[2] >> 3 & 15));
+        const auto b =
+            static_cast<std::size_t>(((c[0] >> 3 & 15) << 8) | ((c[1] >> 3 & 15) << 4) | (c[2] >> 3 & 15));
         if (!node || !node->samples[b]) {
             d.fill(static_cast<double>(node ? node->tile[b] : tree_->getValue(c)));
         } else {
@@ -88,7 +93,8 @@ TrilinearField::Corners TrilinearField::corners(const Coord& c) const {
 double TrilinearField::without_nan(const Corners& d, const Vec3d& t) {
     double sum = 0, lost = 0;
     for (std::size_t k = 0; k < 8; ++k) {
-        const double weight = (k & 1 ? t.x() : 1 - t.x()) * (k & 2 ? t.y() : 1 - t.y()) * (k & 4 ? t.z() : 1 - t.z());
+        const double weight =
+            (k & 1 ? t.x() : 1 - t.x()) * (k & 2 ? t.y() : 1 - t.y()) * (k & 4 ? t.z() : 1 - t.z());
         if (std::isfinite(d[k]))
             sum += weight * d[k];
         else

@@ -1,5 +1,5 @@
-// The trilinear interpolant of a sparse grid at any place, fast. For the surface extractors; nothing outside this
-// folder needs it.
+// The trilinear interpolant of a sparse grid at any place, fast. For the surface extractors; nothing outside
+// this folder needs it.
 #pragma once
 
 #include <array>
@@ -11,14 +11,14 @@
 
 namespace vdbgeo {
 
-/// u(x) − isovalue, where u is the trilinear interpolant of a map's samples and x is in index units: at or above
-/// 0 inside. The map is the function that marching_cubes reads: active voxels, inactive voxels and tiles alike,
-/// outside the box of a bounded frame nothing (−∞); an unbounded grid goes on as background. The isovalue is
-/// taken as a 32-bit float.
+/// u(x) − isovalue, where u is the trilinear interpolant of a map's samples and x is in index units: at or
+/// above 0 inside. The map is the function that marching_cubes reads: active voxels, inactive voxels and
+/// tiles alike, outside the box of a bounded frame nothing (−∞); an unbounded grid goes on as background. The
+/// isovalue is taken as a 32-bit float.
 ///
-/// Samples that equal the isovalue count as inside and are raised by 1/1024 of the isovalue's height above the
-/// map's minimum, so that a voxel which just reaches it has an inside of some size, as marching cubes gives it. A
-/// sample that is not a number is empty: −∞ wherever it has a weight above 1/1024.
+/// Samples that equal the isovalue count as inside and are raised by 1/1024 of the isovalue's height above
+/// the map's minimum, so that a voxel which just reaches it has an inside of some size, as marching cubes
+/// gives it. A sample that is not a number is empty: −∞ wherever it has a weight above 1/1024.
 ///
 /// Queries may come from any thread. One costs some 20 ns: a hash over the grid's 128³ nodes, a table of each
 /// one's leaves. The grid must not change meanwhile.

@@ -44,7 +44,8 @@ class Polish {
     std::size_t pass() {
         std::vector<std::pair<double, int>> bad;
         for (int f = 0; f < static_cast<int>(mesh().n_faces()); ++f)
-            if (const double c = cosine(FaceHandle(f)); c > goal_) bad.emplace_back(-c, f);
+            if (const double c = cosine(FaceHandle(f)); c > goal_ && is_free(FaceHandle(f)))
+                bad.emplace_back(-c, f);
         std::sort(bad.begin(), bad.end());
         std::size_t changes = 0;
         for (const auto& entry : bad)
@@ -58,7 +59,7 @@ class Polish {
         enum { nothing, move, flip, collapse, split } what = nothing;
         HalfedgeHandle edge;
         VertexHandle vertex;
-        Landing at{};
+        Landing at = {};
         double after = 1;
     };
 
@@ -69,6 +70,9 @@ class Polish {
         const HalfedgeHandle h = mesh().halfedge_handle(f);
         return least_angle_cosine(point(mesh().from_vertex_handle(h)), point(mesh().to_vertex_handle(h)),
                                   apex(h));
+    }
+    bool is_free(FaceHandle f) {
+        return state_.site(mesh().to_vertex_handle(mesh().halfedge_handle(f))).length > 0;
     }
     const Vec3d& apex(HalfedgeHandle h) {
         return point(mesh().to_vertex_handle(mesh().next_halfedge_handle(h)));
@@ -106,7 +110,7 @@ class Polish {
         const Vec3d n = fan.normal.normalized();
         const Vec3d u = n.unitOrthogonal(), v = n.cross(u);
         double step = 0.25 * at.site.length;
-        for (int tries = 0; tries < 30 && step > 0.005 * at.site.length; ++tries) {
+        for (int tries = 0; tries < 20 && step > 0.01 * at.site.length && cosine > goal_; ++tries) {
             Landing best = at;
             double best_cosine = cosine;
             for (int k = 0; k < 6; ++k) {
@@ -128,7 +132,7 @@ class Polish {
     }
 
     void try_move(VertexHandle v, Change& best) {
-        Change change{Change::move, {}, v, {point(v), state_.site(v)}, 1};
+        Change change{Change::move, HalfedgeHandle(), v, {point(v), state_.site(v)}, 1};
         if (change.at.site.kind == Kind::corner) return;
         Fan fan;
         add_fan(v, VertexHandle(), fan);
@@ -162,14 +166,14 @@ class Polish {
         add_fan(kept, gone, fan);
         const double before = std::max(fan_cosine(gone), fan_cosine(kept));
         fan.side_cosine = 0.3 * fan.normal.norm();
-        Change change{Change::collapse, h, {}, state_.collapse_landing(h), 1};
+        Change change{Change::collapse, h, kept, state_.collapse_landing(h), 1};
         change.after = cost(fan, change.at.point);
         if (change.after < 1) search(fan, change.at, change.after);
         keep_better(change, before, best);
     }
     void try_split(HalfedgeHandle h, Change& best) {
         const HalfedgeHandle o = mesh().opposite_halfedge_handle(h);
-        Change change{Change::split, h, {}, state_.split_landing(mesh().edge_handle(h)), 1};
+        Change change{Change::split, h, VertexHandle(), state_.split_landing(mesh().edge_handle(h)), 1};
         Fan fan;
         double before = -1;
         for (const HalfedgeHandle side : {h, o}) {
@@ -187,15 +191,19 @@ class Polish {
         keep_better(change, before, best);
     }
 
+    /// The cheap changes first; whatever reaches the goal will do.
     bool improve(FaceHandle f) {
         Change best;
-        HalfedgeHandle h = mesh().halfedge_handle(f);
-        for (int k = 0; k < 3; ++k, h = mesh().next_halfedge_handle(h)) {
-            try_move(mesh().to_vertex_handle(h), best);
-            try_flip(h, best);
-            try_collapse(h, best);
-            try_split(h, best);
-        }
+        const HalfedgeHandle first = mesh().halfedge_handle(f);
+        const HalfedgeHandle second = mesh().next_halfedge_handle(first);
+        const HalfedgeHandle sides[] = {first, second, mesh().next_halfedge_handle(second)};
+        for (const HalfedgeHandle h : sides) try_flip(h, best);
+        for (const HalfedgeHandle h : sides)
+            if (best.after > goal_) try_move(mesh().to_vertex_handle(h), best);
+        for (const HalfedgeHandle h : sides)
+            if (best.after > goal_) try_collapse(h, best);
+        for (const HalfedgeHandle h : sides)
+            if (best.after > goal_) try_split(h, best);
         return apply(best);
     }
     bool apply(const Change& change) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -16,32 +17,86 @@ namespace {
 
 /// Angles that the last step still works on.
 constexpr double least_angle_deg = 33;
+/// Pieces of no more faces are too coarse to be made over.
+constexpr std::uint64_t dust_faces = 24;
 
 void check_positive(double value, const char* name) {
     if (!(std::isfinite(value) && value > 0))
         throw InvalidInput(fmt::format("remesh: {} {} is not a positive length", name, value));
 }
 
-double mean_edge_length(const TriMesh& mesh) {
-    double sum = 0;
-    for (const Triangle& t : mesh.triangles)
-        for (std::size_t k = 0; k < 3; ++k)
-            sum += (mesh.points[t[k]] - mesh.points[t[(k + 1) % 3]]).cast<double>().norm();
-    return sum / (3 * static_cast<double>(mesh.triangles.size()));
+struct Size {
+    double area = 0, edges = 0;  ///< Å², Å
+    std::uint64_t faces = 0;
+
+    void add(const TriMesh& mesh, const Triangle& t) {
+        const Vec3d a = mesh.points[t[0]].cast<double>(), b = mesh.points[t[1]].cast<double>(),
+                    c = mesh.points[t[2]].cast<double>();
+        area += area_vector(a, b, c).norm() / 2;
+        edges += (a - b).norm() + (b - c).norm() + (c - a).norm();
+        ++faces;
+    }
+    double mean_edge() const { return edges / (3 * static_cast<double>(faces)); }
+};
+
+Size size_of(const TriMesh& mesh) {
+    Size size;
+    for (const Triangle& t : mesh.triangles) size.add(mesh, t);
+    return size;
 }
 
-double area(const TriMesh& mesh) {
-    double sum = 0;
-    for (const Triangle& t : mesh.triangles)
-        sum += area_vector(mesh.points[t[0]].cast<double>(), mesh.points[t[1]].cast<double>(),
-                           mesh.points[t[2]].cast<double>())
-                   .norm();
-    return sum / 2;
+/// The piece that each vertex belongs to, numbered from 0; unused vertices are in piece 0.
+std::vector<std::uint32_t> pieces_of_vertices(const TriMesh& mesh, const FaceAdjacency& adjacency,
+                                              std::uint32_t& count) {
+    constexpr std::uint32_t none = FaceAdjacency::none;
+    std::vector<std::uint32_t> piece(mesh.points.size(), none);
+    std::vector<VertexId> stack;
+    count = 0;
+    for (VertexId seed = 0; seed < piece.size(); ++seed) {
+        if (piece[seed] != none || adjacency.outgoing[seed] == none) continue;
+        const auto visit = [&](VertexId v) {
+            if (piece[v] == none) piece[v] = count, stack.push_back(v);
+        };
+        visit(seed);
+        while (!stack.empty()) {
+            const std::uint32_t first = adjacency.outgoing[stack.back()];
+            stack.pop_back();
+            std::uint32_t h = first;
+            do {
+                for (const VertexId v : mesh.triangles[h / 3]) visit(v);
+                h = adjacency.around(h);
+            } while (h != none && h != first);
+        }
+        ++count;
+    }
+    std::replace(piece.begin(), piece.end(), none, 0u);
+    return piece;
+}
+
+/// Small pieces get shorter edges, so that some 25 faces are left of each, but none shorter than theirs are;
+/// those of a few faces, the dust of a voxel or two, stay as they are: their length is 0. `lengths`: one for
+/// each vertex, or one for all where all are the same.
+void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vector<float>& lengths) {
+    std::uint32_t count = 0;
+    const std::vector<std::uint32_t> piece = pieces_of_vertices(mesh, adjacency, count);
+    std::vector<Size> sizes(count);
+    for (const Triangle& t : mesh.triangles) sizes[piece[t[0]]].add(mesh, t);
+    std::vector<float> most(count);
+    for (std::uint32_t i = 0; i < count; ++i)
+        most[i] = static_cast<float>(std::max(0.3 * std::sqrt(sizes[i].area), sizes[i].mean_edge()));
+    if (lengths.size() == 1) {
+        if (std::none_of(most.begin(), most.end(), [&](float m) { return m < lengths[0]; })) return;
+        lengths.resize(mesh.points.size(), lengths[0]);
+    }
+    for (std::size_t v = 0; v < lengths.size(); ++v) {
+        const std::uint32_t i = piece[v];
+        if (most[i] < lengths[v]) lengths[v] = sizes[i].faces <= dust_faces ? 0 : most[i];
+    }
 }
 
 /// Before anything is split: half-edges are counted by 31 bits.
-void check_size(const TriMesh& mesh, double length) {
-    const double faces = area(mesh) / (std::sqrt(3.0) / 4 * length * length);
+void check_size(double area, double length) {
+    const double faces = area / (std::sqrt(3.0) / 4 * length * length);
     if (faces > 3e8)
         throw InvalidInput(
             fmt::format("remesh: edges of {} Å are about {:.1e} faces, more than 3e8; longer ones are needed",
@@ -72,14 +127,16 @@ TriMesh isotropic_remesh(const TriMesh& mesh, const IsotropicRemeshOptions& opti
     options.check();
     check(mesh, "remesh");
     if (mesh.empty() || options.iterations == 0) return mesh;
-    const double length = options.adaptive ? options.adaptive->min_length
-                                           : options.target_length.value_or(mean_edge_length(mesh));
+    const Size size = size_of(mesh);
+    const double length =
+        options.adaptive ? options.adaptive->min_length : options.target_length.value_or(size.mean_edge());
     check_positive(length, "mean edge length");
-    if (!options.adaptive) check_size(mesh, length);
+    if (!options.adaptive) check_size(size.area, length);
     const FaceAdjacency adjacency = face_adjacency(mesh, "remesh");
     const InputSurface input(mesh, adjacency, options.feature_angle_deg, length / 2);
-    const std::vector<float> lengths = options.adaptive ? curvature_lengths(input, *options.adaptive)
-                                                        : std::vector<float>{static_cast<float>(length)};
+    std::vector<float> lengths = options.adaptive ? curvature_lengths(input, *options.adaptive)
+                                                  : std::vector<float>{static_cast<float>(length)};
+    fit_to_pieces(mesh, adjacency, lengths);
     RemeshState state(input, lengths);
     progress.report(0.1);
     for (int i = 0; i < options.iterations; ++i) {
@@ -97,6 +154,7 @@ TriMesh isotropic_remesh(const TriMesh& mesh, const IsotropicRemeshOptions& opti
         progress.report(0.1 + 0.7 * (i + 1) / options.iterations);
     }
     state.flip_for_angles();
+    if (getenv("NOPOLISH")) return state.result();
     polish_angles(state, least_angle_deg);
     progress.report(1);
     return state.result();

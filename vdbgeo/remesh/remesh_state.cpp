@@ -27,13 +27,17 @@ RemeshState::RemeshState(const InputSurface& input, const std::vector<float>& le
     for (VertexId v = 0; v < mesh_.n_vertices(); ++v) {
         const std::uint32_t h = adjacency.outgoing[v];
         VertexSite& s = site(VertexHandle(static_cast<int>(v)));
-        s.kind = input.kind(v);
         s.length = lengths.size() == 1 ? lengths[0] : lengths[v];
+        s.kind = s.length > 0 ? input.kind(v) : Kind::corner;
         if (h != none) s.place = s.kind == Kind::line ? input.segment_at(v) : h / 3;
     }
     int e = 0;
     for (std::uint32_t h = 0; h < adjacency.twin.size(); ++h)  // edges are numbered by their first half-edges
-        if (adjacency.twin[h] > h) mesh_.property(lines_, EdgeHandle(e++)) = input.segment(h);
+        if (adjacency.twin[h] > h) {
+            const EdgeHandle edge(e++);
+            const bool fixed = !(site(mesh_.from_vertex_handle(mesh_.halfedge_handle(edge, 0))).length > 0);
+            mesh_.property(lines_, edge) = fixed ? h : input.segment(h);
+        }
     const MeshProperty* cap = input.mesh().find_face_property(cap_property);
     if (cap && cap->components != 1) cap = nullptr;
     for (std::size_t f = 0; f < mesh_.n_faces(); ++f)
@@ -111,12 +115,11 @@ void RemeshState::split_long(double factor) {
             const HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
             const VertexHandle a = mesh_.from_vertex_handle(h), b = mesh_.to_vertex_handle(h);
             const double limit = factor * length(a, b), squared = (point(a) - point(b)).squaredNorm();
-            if (squared <= limit * limit) break;
+            if (!(limit > 0) || squared <= limit * limit) break;
             const Landing at = split_landing(e);
-            // A point at one of the ends (the end of a line, a fold) makes no progress.
-            const double least = 0.01 * squared;
-            if ((at.point - point(a)).squaredNorm() < least || (at.point - point(b)).squaredNorm() < least)
-                break;
+            // A walk that ends far from the middle has lost its way (the sheet folds between the ends): the
+            // edges that come would be no shorter, without end.
+            if ((at.point - 0.5 * (point(a) + point(b))).squaredNorm() > 0.0625 * squared) break;
             split(e, at);
         }
     }

@@ -26,7 +26,7 @@ inline double least_angle_cosine(const Vec3d& p, const Vec3d& q, const Vec3d& r)
 /// Where a vertex of the remeshed surface lies on the input.
 struct VertexSite {
     std::uint32_t place = 0;  ///< the input's face; for those on lines the segment
-    float length = 0;         ///< Å, that edges here should have
+    float length = 0;         ///< Å, that edges here should have; 0: nothing changes here
     InputSurface::Kind kind = InputSurface::Kind::free;
 };
 
@@ -41,7 +41,7 @@ class RemeshState {
     using Kind = InputSurface::Kind;
     static constexpr std::uint32_t none = FaceAdjacency::none;
 
-    /// `lengths`: one for each vertex of the input, or one for all.
+    /// `lengths`: one for each vertex of the input, or one for all; pieces of length 0 stay as they are.
     RemeshState(const InputSurface& input, const std::vector<float>& lengths);
 
     /// Splits every edge longer than `factor` times its length.
@@ -73,8 +73,8 @@ class RemeshState {
 
     /// A point of the input near p, downhill from where `start` lies, with its site.
     struct Landing {
-        Vec3d point;
-        VertexSite site;
+        Vec3d point = Vec3d::Zero();
+        VertexSite site = {};
     };
     Landing land(const Vec3d& p, const VertexSite& start) const;
 

@@ -21,8 +21,6 @@ constexpr double least_cosine = 0.2;
 /// More neighbours are not made.
 constexpr std::size_t most_neighbours = 24;
 
-Vec3d to_double(const float (&p)[3]) { return {double(p[0]), double(p[1]), double(p[2])}; }
-
 }  // namespace
 
 EdgeCollapse::EdgeCollapse(const TriMesh& mesh, const std::string& stage)
@@ -47,8 +45,6 @@ EdgeCollapse::EdgeCollapse(const TriMesh& mesh, const std::string& stage)
     table_.drop_first_corners();
     parallel_for(vertices_.size(), 2048, [&](std::size_t v) { set_up(static_cast<VertexId>(v)); });
 }
-
-Vec3d EdgeCollapse::position(VertexId v) const { return to_double(vertices_[v].position); }
 
 /// Whether the edge that corner c looks at is on a border or a rim.
 bool EdgeCollapse::is_line(Corner c) const {
@@ -90,8 +86,7 @@ void EdgeCollapse::set_up(VertexId v) {
 }
 
 void EdgeCollapse::gather(VertexId v, Ring& ring) const {
-    ring.corners.clear();
-    ring.neighbours.clear();
+    ring.clear();
     Corner start = vertices_[v].corner;
     if (freedom_[v] != Freedom::free)  // to the right end of an open fan
         for (Corner c = table_.right(start); c != none && c != vertices_[v].corner; c = table_.right(c))
@@ -117,7 +112,7 @@ EdgeCollapse::Placement EdgeCollapse::place(VertexId a, VertexId b, bool line) c
     const Vertex &va = vertices_[a], &vb = vertices_[b];
     if (at_a != Freedom::free && at_b != Freedom::free && (!line || (at_a == Freedom::fixed && at_b == at_a)))
         return {infinity, Vec3d::Zero()};
-    const Vec3d d = to_double(vb.position) - to_double(va.position);
+    const Vec3d d = position(b) - position(a);
     Quadric<double> sum;
     sum.add(va.quadric, Vec3d::Zero());
     sum.add(vb.quadric, d);

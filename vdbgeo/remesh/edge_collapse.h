@@ -71,6 +71,11 @@ class EdgeCollapse {
     struct Ring {
         std::vector<Corner> corners;
         std::vector<VertexId> neighbours;
+
+        void clear() {
+            corners.clear();
+            neighbours.clear();
+        }
     };
 
     struct Placement {
@@ -86,7 +91,10 @@ class EdgeCollapse {
     void set_up(VertexId v);
     bool is_cap(std::uint32_t face) const { return !caps_.empty() && caps_[face]; }
     bool is_line(Corner c) const;
-    Vec3d position(VertexId v) const;
+    Vec3d position(VertexId v) const {
+        const float(&p)[3] = vertices_[v].position;
+        return {double(p[0]), double(p[1]), double(p[2])};
+    }
     void gather(VertexId v, Ring& ring) const;
     bool spoke_is_line(const Ring& ring, std::size_t i) const;
     Placement place(VertexId a, VertexId b, bool line) const;

@@ -11,13 +11,34 @@ namespace vdbgeo {
 
 /// At least one of the two; with both, whichever is reached first ends it.
 struct SimplifyOptions {
-    std::optional<std::uint64_t> faces;   ///< stop at this many faces
-    std::optional<double> max_distance;   ///< Å: two-sided Hausdorff distance to the input stays within it
+    std::optional<std::uint64_t> faces;  ///< stop at this many faces (or one fewer)
+    std::optional<double> max_distance;  ///< Å: two-sided Hausdorff distance to the input stays within it
 
+    /// Throws InvalidInput where neither is set, and for a distance that is not a finite number above 0.
     void check() const;
 };
 
-/// Garland & Heckbert 1997 (doi:10.1145/258734.258849).
+/// Collapses edges, the cheapest first, to the point of least Σ area·(distance to the planes of the faces
+/// that the edge has come to stand for)² (Garland & Heckbert 1997, doi:10.1145/258734.258849), with a pull of
+/// a thousandth towards the vertices' places, which rounds the triangles and settles what flat places leave
+/// open. Edges come from a queue in which costs count to a quarter of an octave; the order, and so the
+/// result, is the same for any number of threads.
+///
+/// The mesh has to be an oriented manifold, open or closed; anything else is refused (InvalidInput, "simplify
+/// needs a manifold mesh: …; try repair"). It stays one, with its components, its genus and its borders (the
+/// link condition): a component never gets smaller than a tetrahedron, a border than a triangle, and where
+/// nothing more can go the result has more faces than were asked for. No face turns by more than 78 degrees
+/// in one collapse. Borders and the rims of caps (face property "cap") collapse along themselves only. Faces
+/// keep their properties; a vertex has those of the end of the edge that was nearer. Points that no face
+/// names are dropped. A mesh that has few enough faces comes back as it is, and so does an empty one.
+///
+/// `max_distance` is kept in two steps. A collapse is refused where the middle of one of its faces or sides,
+/// or its vertex, is further from the input; and when all is done `surface_distance`, with the spacing that
+/// it takes by itself, measures both sides: where that is over the bound (something thin has gone), all is
+/// done again with less. The guarantee is that measured distance.
+///
+/// Cost: about 3 µs a collapse and 70 bytes a face of the input beside it and the result; with `max_distance`
+/// ten times the time, and 90 bytes more for the search trees.
 TriMesh simplify(const TriMesh& mesh, const SimplifyOptions& options, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -38,7 +38,7 @@ Command measure_command() {
     return {"measure", "Area, volume, components, genus, closedness and angles of a mesh",
             "  vdbgeo measure groel.ply --json", [](CLI::App& app) {
                 auto o = std::make_shared<MeasureOptions>();
-                app.add_option("mesh", o->in, "Mesh: .ply .obj .off .stl")->required();
+                app.add_option("mesh", o->in, "Mesh: " + mesh_endings_text())->required();
                 app.add_option("--histogram", o->histogram,
                                "Write the histogram of the triangles' angles as a PNG here");
                 return [o](Session& session) { run_measure(*o, session); };

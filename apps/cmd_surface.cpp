@@ -18,7 +18,7 @@ struct SurfaceOptions {
 
 void run_surface(const SurfaceOptions& o, Session& session) {
     if (!is_mesh_ending(o.out))
-        throw UsageError(fmt::format("{}: the ending tells the format: .ply .obj .off .stl", o.out));
+        throw UsageError(fmt::format("{}: the ending tells the format: {}", o.out, mesh_endings_text()));
     const Isovalue rule = o.iso.parse();
     Json seconds;
     Clock clock;
@@ -50,7 +50,7 @@ Command surface_command() {
             "  vdbgeo surface emd_1080.map groel.ply --iso 0.8", [](CLI::App& app) {
                 auto o = std::make_shared<SurfaceOptions>();
                 app.add_option("in", o->in, "Map (MRC, CCP4) or VDB grid")->required();
-                app.add_option("out", o->out, "Mesh to write: .ply .obj .off .stl")->required();
+                app.add_option("out", o->out, "Mesh to write: " + mesh_endings_text())->required();
                 o->iso.add(app);
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);

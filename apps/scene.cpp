@@ -142,8 +142,10 @@ void SceneFlags::add(CLI::App& app) {
     app.add_option(
         "--grids", grid_names,
         "Grids to write: of density, surface, gradient, mean_curvature, with commas between [density]");
-    app.add_option("--iso", iso,
-                   "Isovalue of the grid surface: a density, Nsigma (mean + N rms), or auto (3sigma)")
+    app.add_option(
+           "--iso", iso,
+           "Isovalue of the grid surface: a density, Nsigma (mean + N rms), volume:V (Å^3), mass:M (Da, kDa, "
+           "MDa), otsu, or auto (3sigma)")
         ->capture_default_str();
     app.add_option(
         "--fog", fog,
@@ -193,8 +195,7 @@ std::vector<GridBase::ConstPtr> scene_grids(const std::string& file, const MapFi
         std::vector<GridBase::Ptr> grids;
         if (asked("density")) grids.push_back(density_grid(in, flags, levels, session.stage("density")));
         if (asked("surface")) {
-            if (!levels.isovalue)
-                levels.isovalue = flags.isovalue.resolve(in.map);
+            if (!levels.isovalue) levels.isovalue = flags.isovalue.resolve(in.map);
             grids.push_back(level_set(in.map, *levels.isovalue, {}, session.stage("surface")));
         }
         const auto shown = shown_voxels(in, flags, grids);

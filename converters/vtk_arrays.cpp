@@ -161,7 +161,7 @@ class Decoder {
         // zlib packs no better than 1 to 1032.
         const std::uint64_t block = sizes[0], last = sizes[1] > 0 ? sizes[1] : block,
                             most = source.left() * 1032 + 64;
-        if (block > most || last > block || (blocks > 1 && block > 0 && (most - last) / block < blocks - 1))
+        if (last > most || last > block || (blocks > 1 && block > 0 && (most - last) / block < blocks - 1))
             fail(
                 fmt::format("{} blocks of {} bytes do not come from {} bytes", blocks, block, source.left()));
         check_bytes(block * (blocks - 1) + last);

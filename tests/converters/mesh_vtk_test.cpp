@@ -176,7 +176,7 @@ TEST(MeshVtk, DamageIsRefusedByName) {
               "byte 0: the compressor 'vtkLZ4DataCompressor' is not known");
     EXPECT_EQ(refusal(file("", "5", "1", ascii_square())), "array 'Points': expected 15 values, found 12");
     EXPECT_EQ(refusal(file("", "4294967296", "1", ascii_square())), "4294967296 points, more than 2^32-1");
-    EXPECT_EQ(refusal(file("", "-4", "1", ascii_square())).substr(0, 20), "byte 115: NumberOfPo");
+    EXPECT_EQ(refusal(file("", "-4", "1", ascii_square())).substr(0, 20), "byte 117: NumberOfPo");
     EXPECT_EQ(refusal(file("", "4", "99999999999", ascii_square())),
               "array 'offsets': expected 99999999999 values, found 1");
     EXPECT_EQ(refusal(file("", "4", "1", ascii_square("0 1 2 4"))), "Polys: cell 0 names point 4 of 4");

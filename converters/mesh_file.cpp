@@ -45,6 +45,7 @@ TriMesh read_any(const MappedFile& file, const std::filesystem::path& path, cons
     if (!stl && is_ply(file.bytes())) return read_ply(file, progress);
     if (!stl && is_glb(file.bytes())) return read_glb(file, progress);
     if (!stl && is_vtk_xml(file.bytes())) return read_vtk_xml(file, progress);
+    if (!stl && is_vtk_legacy(file.bytes())) return read_vtk_legacy(file, progress);
     if (!stl && is_off(file.bytes())) return read_off(file, progress);
     if (!format)
         throw InvalidInput(fmt::format(

@@ -23,6 +23,7 @@ bool is_ply(std::string_view bytes);
 bool is_off(std::string_view bytes);
 bool is_glb(std::string_view bytes);
 bool is_vtk_xml(std::string_view bytes);
+bool is_vtk_legacy(std::string_view bytes);
 /// Whether the size is the one that the count at byte 80 asks for.
 bool is_binary_stl(std::string_view bytes);
 
@@ -32,6 +33,7 @@ TriMesh read_off(const MappedFile& file, const Progress& progress);
 TriMesh read_stl(const MappedFile& file, const Progress& progress);
 TriMesh read_glb(const MappedFile& file, const Progress& progress);
 TriMesh read_vtk_xml(const MappedFile& file, const Progress& progress);
+TriMesh read_vtk_legacy(const MappedFile& file, const Progress& progress);
 
 /// A file to be written: where, and how messages call it.
 struct Output {

@@ -139,7 +139,8 @@ class Decoder {
 
     template <class Source>
     auto plain(Source source) const {
-        const std::uint64_t bytes = words(source, 1)[0];
+        const bool told = encoding_.header_bytes > 0;
+        const std::uint64_t bytes = told ? words(source, 1)[0] : expected_.value_or(0) * array_.type.bytes;
         check_bytes(bytes);
         if (bytes > source.left()) fail(fmt::format("{} bytes, found {}", bytes, source.left()));
         auto values = source.take(bytes);

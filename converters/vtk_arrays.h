@@ -36,7 +36,7 @@ std::optional<VtkType> vtk_type(std::string_view name);
 /// How a file keeps its arrays.
 struct VtkEncoding {
     bool big_endian = false;
-    std::size_t header_bytes = 4;  ///< of a length
+    std::size_t header_bytes = 4;  ///< of a length; 0: arrays have none, their size is the one expected
     bool zlib = false;
     bool appended_base64 = false;
     std::string_view appended;  ///< what stands behind the underscore; empty where there is none

@@ -271,6 +271,13 @@ for ending, reader, writer in (("vtp", vtk.vtkXMLPolyDataReader, vtk.vtkXMLPolyD
                     w.SetByteOrderToBigEndian() if order == "BigEndian" else w.SetByteOrderToLittleEndian()
                     if not packed: w.SetCompressorTypeToNone()
                     w.Write()
+    if ending == "vtp":
+        for version in (42, 51):
+            for binary in (True, False):
+                w = vtk.vtkPolyDataWriter(); w.SetInputData(data); w.SetFileVersion(version)
+                w.SetFileTypeToBinary() if binary else w.SetFileTypeToASCII()
+                w.SetFileName(f"{folder}/old{version}{binary:d}.vtk")
+                w.Write()
 )");
     const auto r = test::run({"/usr/bin/python3", (folder / "convert.py").string(), folder.path().string()});
     EXPECT_EQ(r.code, 0) << r.err;
@@ -278,9 +285,19 @@ for ending, reader, writer in (("vtp", vtk.vtkXMLPolyDataReader, vtk.vtkXMLPolyD
     int files = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
         const std::string ending = entry.path().extension();
-        if (ending != ".vtp" && ending != ".vtu") continue;
+        if (ending != ".vtp" && ending != ".vtu" && ending != ".vtk") continue;
         SCOPED_TRACE(entry.path().filename());
         const TriMesh back = read_mesh(entry.path());
+        if (entry.path().filename() == "old420.vtk" || entry.path().filename() == "old510.vtk") {
+            // as text VTK rounds to six digits or so
+            ASSERT_EQ(back.points.size(), mesh.points.size());
+            for (std::size_t i = 0; i < mesh.points.size(); ++i)
+                EXPECT_LT((back.points[i] - mesh.points[i]).norm(), 1e-4);
+            EXPECT_EQ(back.triangles, mesh.triangles);
+            EXPECT_EQ(back.find_face_property("face")->values, face.values);
+            ++files;
+            continue;
+        }
         EXPECT_EQ(back.points, mesh.points);
         EXPECT_EQ(back.triangles, mesh.triangles);
         for (const MeshProperty& p : mesh.vertex_properties) {
@@ -291,5 +308,44 @@ for ending, reader, writer in (("vtp", vtk.vtkXMLPolyDataReader, vtk.vtkXMLPolyD
         EXPECT_EQ(back.find_face_property("face")->values, face.values);
         ++files;
     }
-    EXPECT_EQ(files, 2 * (1 + 24));
+    EXPECT_EQ(files, 2 * (1 + 24) + 4);
+}
+
+TEST(MeshVtk, OldFilesOfText) {
+    const std::string text =
+        "# vtk DataFile Version 3.0\nsquare\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0\n1 1 0 0 1 "
+        "0\n"
+        "LINES 1 3\n2 0 1\nPOLYGONS 1 5\n4 0 1 2 3\nCELL_DATA 2\nSCALARS id int\nLOOKUP_TABLE default\n7 8\n"
+        "POINT_DATA 4\nNORMALS n float\n0 0 1 0 0 1 0 0 1 0 0 1\nFIELD FieldData 1\nH 1 4 double\n1 2 3 4\n";
+    const TriMesh mesh = read(text, "m.vtk");
+    expect_square(mesh);
+    EXPECT_EQ(mesh.find_face_property("id")->values, (std::vector<float>{8, 8}));
+    EXPECT_EQ(mesh.find_vertex_property("n")->components, 3);
+    EXPECT_EQ(mesh.find_vertex_property("H")->values, (std::vector<float>{1, 2, 3, 4}));
+    const auto with = [&](const std::string& old, const std::string& now) {
+        std::string bad = text;
+        bad.replace(bad.find(old), old.size(), now);
+        const std::string message = refusal(bad, "m.vtk");
+        return message.substr(message.find(": ") + 2);
+    };
+    EXPECT_EQ(with("ASCII", "ASCIJ"), "expected ASCII or BINARY, found 'ASCIJ'");
+    EXPECT_EQ(with("POLYDATA", "STRUCTURED_GRID"), "expected DATASET POLYDATA: only surfaces are read");
+    EXPECT_EQ(with("POINTS 4", "POINTS 400"), "the file ends at value 92 of 1200");
+    EXPECT_EQ(with("POINTS 4", "POINTS 9999999999999"), "expected a count, found '9999999999999'");
+    EXPECT_EQ(with("4 0 1 2 3", "5 0 1 2 3"), "Polys: cell 0 reaches beyond the 5 values");
+    EXPECT_EQ(with("4 0 1 2 3", "4 0 1 2 4"), "cell 0 names point 4 of 4");
+    EXPECT_EQ(with("LINES", "LINED"), "'LINED' is not read here");
+    EXPECT_EQ(with("id int", "id quaternion"), "expected a type such as float or int, found 'quaternion'");
+    EXPECT_EQ(with("ASCII", "BINARY"), "expected a count, found '1 0 0 1 0'");
+}
+
+TEST(MeshVtk, RealOldFiles) {
+    for (const auto& [name, points] :
+         {std::pair("smooth_sphere_r10", 0), std::pair("smooth_torus_rr25_csr10", 2401)}) {
+        const std::string file = std::string("pycurv_curvature/") + name + ".surface.vtk";
+        VDBGEO_NEEDS_DATA(file);
+        const TriMesh mesh = read_mesh(data_folder() / file);
+        if (points > 0) EXPECT_GT(mesh.points.size(), 1000u);
+        EXPECT_GT(mesh.triangles.size(), 1000u);
+    }
 }

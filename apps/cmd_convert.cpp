@@ -29,7 +29,7 @@ struct ConvertOptions {
 
 void convert_mesh(const ConvertOptions& o, Session& session) {
     if (!is_mesh_ending(o.out))
-        throw UsageError(fmt::format("{}: a mesh becomes one of .ply .obj .off .stl", o.out));
+        throw UsageError(fmt::format("{}: a mesh becomes one of {}", o.out, mesh_endings_text()));
     const auto progress = session.stage("converting");
     const TriMesh mesh = read_mesh(o.in, progress.part(0, 0.5));
     write_mesh(mesh, o.out, {}, progress.part(0.5, 1));
@@ -210,9 +210,9 @@ Command convert_command() {
                 app.add_option(
                        "files", o->files,
                        "Map, grid or mesh file (- reads a map from a pipe), and last the file to write: "
-                       ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; .ply .obj .off .stl; - is an MRC "
-                       "map for a "
-                       "pipe. Several maps make a series: OUT_0001.vdb and so on")
+                       ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; " +
+                           mesh_endings_text() +
+                           "; - is an MRC map for a pipe. Several maps make a series: OUT_0001.vdb and so on")
                     ->required()
                     ->expected(2, -1)
                     ->type_name("IN... OUT");

@@ -42,20 +42,21 @@ void run_render(const RenderCommandOptions& o, Session& session) {
 }  // namespace
 
 Command render_command() {
-    return {"render", "Draw a mesh, or a map's surface at an isovalue, as a PNG; no display is needed",
-            "  vdbgeo render groel.ply groel.png --view iso", [](CLI::App& app) {
-                auto o = std::make_shared<RenderCommandOptions>();
-                app.add_option("in", o->in, "Mesh (.ply .obj .off .stl), map or VDB grid")->required();
-                app.add_option("out", o->out, "Picture to write: .png")->required();
-                add_render_flags(app, o->render);
-                o->iso.add(app);
-                o->map.add_reading(app);
-                return [o](Session& session) {
-                    o->map.finish();
-                    check_usage(o->render);
-                    run_render(*o, session);
-                };
-            }};
+    return {
+        "render", "Draw a mesh, or a map's surface at an isovalue, as a PNG; no display is needed",
+        "  vdbgeo render groel.ply groel.png --view iso", [](CLI::App& app) {
+            auto o = std::make_shared<RenderCommandOptions>();
+            app.add_option("in", o->in, "Mesh (" + mesh_endings_text() + "), map or VDB grid")->required();
+            app.add_option("out", o->out, "Picture to write: .png")->required();
+            add_render_flags(app, o->render);
+            o->iso.add(app);
+            o->map.add_reading(app);
+            return [o](Session& session) {
+                o->map.finish();
+                check_usage(o->render);
+                run_render(*o, session);
+            };
+        }};
 }
 
 }  // namespace vdbgeo::app

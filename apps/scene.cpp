@@ -142,8 +142,10 @@ void SceneFlags::add(CLI::App& app) {
     app.add_option(
         "--grids", grid_names,
         "Grids to write: of density, surface, gradient, mean_curvature, with commas between [density]");
-    app.add_option("--iso", iso,
-                   "Isovalue of the grid surface: a density, Nsigma (mean + N rms), or auto (3sigma)")
+    app.add_option(
+           "--iso", iso,
+           "Isovalue of the grid surface: a density, Nsigma (mean + N rms), volume:V (Å^3), mass:M (Da, kDa, "
+           "MDa), otsu, or auto (3sigma)")
         ->capture_default_str();
     app.add_option(
         "--fog", fog,

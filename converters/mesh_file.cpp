@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "converters/mesh_formats.h"
+#include "converters/mesh_properties.h"
 #include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
@@ -19,10 +20,10 @@ struct Format {
     void (*write)(const TriMesh&, const Output&);
 };
 
-constexpr Format formats[] = {{".ply", read_ply, write_ply},
-                              {".obj", read_obj, write_obj},
-                              {".off", read_off, write_off},
-                              {".stl", read_stl, write_stl}};
+constexpr Format formats[] = {{".ply", read_ply, write_ply},     {".obj", read_obj, write_obj},
+                              {".off", read_off, write_off},     {".stl", read_stl, write_stl},
+                              {".vtp", read_vtk_xml, write_vtp}, {".vtu", read_vtk_xml, write_vtu},
+                              {".glb", read_glb, write_glb}};
 
 /// The format that the name tells, nullptr for none.
 const Format* format_of(const std::filesystem::path& path) {
@@ -42,12 +43,14 @@ TriMesh read_any(const MappedFile& file, const std::filesystem::path& path, cons
     // The first 80 bytes of a binary STL file are free, they may say "ply" as well.
     const bool stl = format && format->read == read_stl && is_binary_stl(file.bytes());
     if (!stl && is_ply(file.bytes())) return read_ply(file, progress);
+    if (!stl && is_glb(file.bytes())) return read_glb(file, progress);
+    if (!stl && is_vtk_xml(file.bytes())) return read_vtk_xml(file, progress);
+    if (!stl && is_vtk_legacy(file.bytes())) return read_vtk_legacy(file, progress);
     if (!stl && is_off(file.bytes())) return read_off(file, progress);
     if (!format)
-        throw InvalidInput(
-            fmt::format("{}: not a mesh: the content is neither PLY nor OFF and the ending is none "
-                        "of {}",
-                        file.name(), known_endings()));
+        throw InvalidInput(fmt::format(
+            "{}: not a mesh: the content is none of PLY, OFF, glTF and VTK, and the ending none of {}",
+            file.name(), known_endings()));
     return format->read(file, progress);
 }
 
@@ -62,6 +65,11 @@ void put_point(Buffer& buffer, const Vec3f& p, const MeshWriteOptions& options) 
                        *options.digits);
     else
         fmt::format_to(out, "{} {} {}", p[0], p[1], p[2]);
+}
+
+void put_color(Buffer& buffer, const float* color) {
+    fmt::format_to(fmt::appender(buffer), " {} {} {}", color_value(color[0]), color_value(color[1]),
+                   color_value(color[2]));
 }
 
 }  // namespace mesh_formats
@@ -99,6 +107,8 @@ std::vector<std::string> mesh_endings() {
     for (const Format& format : formats) endings.emplace_back(format.ending);
     return endings;
 }
+
+std::string mesh_endings_text() { return fmt::format("{}", fmt::join(mesh_endings(), " ")); }
 
 bool is_mesh_ending(const std::filesystem::path& path) { return format_of(path) != nullptr; }
 

@@ -21,6 +21,9 @@ namespace vdbgeo::mesh_formats {
 /// Whether the bytes begin as this format's files do.
 bool is_ply(std::string_view bytes);
 bool is_off(std::string_view bytes);
+bool is_glb(std::string_view bytes);
+bool is_vtk_xml(std::string_view bytes);
+bool is_vtk_legacy(std::string_view bytes);
 /// Whether the size is the one that the count at byte 80 asks for.
 bool is_binary_stl(std::string_view bytes);
 
@@ -28,6 +31,9 @@ TriMesh read_ply(const MappedFile& file, const Progress& progress);
 TriMesh read_obj(const MappedFile& file, const Progress& progress);
 TriMesh read_off(const MappedFile& file, const Progress& progress);
 TriMesh read_stl(const MappedFile& file, const Progress& progress);
+TriMesh read_glb(const MappedFile& file, const Progress& progress);
+TriMesh read_vtk_xml(const MappedFile& file, const Progress& progress);
+TriMesh read_vtk_legacy(const MappedFile& file, const Progress& progress);
 
 /// A file to be written: where, and how messages call it.
 struct Output {
@@ -41,6 +47,9 @@ void write_ply(const TriMesh& mesh, const Output& out);
 void write_obj(const TriMesh& mesh, const Output& out);
 void write_off(const TriMesh& mesh, const Output& out);
 void write_stl(const TriMesh& mesh, const Output& out);
+void write_glb(const TriMesh& mesh, const Output& out);
+void write_vtp(const TriMesh& mesh, const Output& out);
+void write_vtu(const TriMesh& mesh, const Output& out);
 
 /// STL counts facets in 32 bits: InvalidInput for more.
 void check_stl_facets(std::uint64_t facets, const std::string& name);
@@ -74,6 +83,9 @@ void put(Buffer& buffer, T value) {
 
 /// Appends "x y z" with the digits asked for.
 void put_point(Buffer& buffer, const Vec3f& point, const MeshWriteOptions& options);
+
+/// Appends " r g b", each 0…1 with all digits.
+void put_color(Buffer& buffer, const float* color);
 
 /// Cuts a polygon into triangles around its first corner.
 inline void append_fan(const std::vector<VertexId>& polygon, Array<Triangle>& triangles) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "converters/mesh_formats.h"
+#include "converters/mesh_properties.h"
 #include "converters/text_cursor.h"
 #include "vdbgeo/core/errors.h"
 
@@ -22,6 +23,7 @@ struct Reader {
     // Faces may stand before their vertices: the highest number so far is checked at the end.
     std::int64_t highest = 0;
     std::size_t highest_line = 0;
+    std::vector<float> colors;  // of the vertices so far, as long as all have one
 
     void vertex();
     void face();
@@ -32,6 +34,11 @@ void Reader::vertex() {
     if (mesh.points.size() == TriMesh::max_vertices) text.fail("more than 2^32-1 vertices");
     const float x = text.number("x"), y = text.number("y"), z = text.number("z");
     mesh.points.emplace_back(x, y, z);
+    // Behind the coordinates may stand a weight, or red, green and blue.
+    std::array<std::string_view, 3> more;
+    for (std::string_view& word : more) word = text.word();
+    if (more[2].empty() || colors.size() != 3 * (mesh.points.size() - 1)) return;
+    for (const std::string_view word : more) colors.push_back(text.number_in(word, "colour"));
 }
 
 /// The vertex of "v", "v/vt", "v//vn" or "v/vt/vn".
@@ -69,7 +76,7 @@ void Reader::face() {
 }  // namespace
 
 TriMesh read_obj(const MappedFile& file, const Progress& progress) {
-    Reader reader{TextCursor(file.bytes(), file.name(), '#'), {}, {}};
+    Reader reader{TextCursor(file.bytes(), file.name(), '#'), {}, {}, 0, 0, {}};
     TextCursor& text = reader.text;
     for (std::size_t n = 1; text.next_line(); ++n) {
         const std::string_view statement = text.word();
@@ -87,15 +94,19 @@ TriMesh read_obj(const MappedFile& file, const Progress& progress) {
     if (reader.highest > static_cast<std::int64_t>(count))
         throw InvalidInput(fmt::format("{}: line {}: a corner names vertex {} of {}", file.name(),
                                        reader.highest_line, reader.highest, count));
+    if (count > 0 && reader.colors.size() == 3 * count)
+        reader.mesh.vertex_properties.push_back({"color", 3, std::move(reader.colors)});
     return std::move(reader.mesh);
 }
 
 void write_obj(const TriMesh& mesh, const Output& out) {
     out.file.write("# vdbgeo, coordinates in Angstrom\n");
+    const MeshProperty* const color = vertex_color(mesh);
     write_elements(out.file, mesh.points.size(), out.progress.part(0, 0.5),
                    [&](std::size_t i, Buffer& buffer) {
                        buffer.append(std::string_view("v "));
                        put_point(buffer, mesh.points[i], out.options);
+                       if (color) put_color(buffer, &color->values[3 * i]);
                        buffer.push_back('\n');
                    });
     write_elements(out.file, mesh.triangles.size(), out.progress.part(0.5, 1),

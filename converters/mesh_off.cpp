@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "converters/mesh_formats.h"
+#include "converters/mesh_properties.h"
 #include "converters/text_cursor.h"
 #include "vdbgeo/core/errors.h"
 
@@ -14,6 +15,7 @@ namespace {
 /// The first word of a file, like "CNOFF", taken apart.
 struct Keyword {
     bool normals = false;          // N: each vertex has a normal after its position
+    bool colors = false;           // C: and a colour after these
     bool other_dimension = false;  // 4 or n: points are not in space
     std::string_view rest;         // files are seen whose counts follow without a blank: "OFF490 518 0"
 };
@@ -26,7 +28,7 @@ std::optional<Keyword> parse_keyword(std::string_view word) {
         return found;
     };
     take("ST");
-    take("C");
+    keyword.colors = take("C");
     keyword.normals = take("N");
     keyword.other_dimension = take("4");
     keyword.other_dimension |= take("n");
@@ -59,7 +61,7 @@ class Reader {
 
     TextCursor text_;
     std::size_t size_;
-    bool normals_ = false;
+    bool normals_ = false, colors_ = false;
     TriMesh mesh_;
     std::vector<VertexId> polygon_;
 };
@@ -77,6 +79,7 @@ Counts Reader::header() {
         if (keyword->other_dimension)
             text_.fail(fmt::format("{}: only points in space are read", in_quotes(word)));
         normals_ = keyword->normals;
+        colors_ = keyword->colors;
         word = keyword->rest.empty() ? text_.word() : keyword->rest;
         if (word.empty() && text_.next_line()) word = text_.word();
         if (word == "BINARY") text_.fail("binary OFF files are not read");
@@ -112,9 +115,12 @@ void Reader::line(const char* what, std::uint64_t number, std::uint64_t of) {
 void Reader::vertex() {
     const float x = text_.number("x"), y = text_.number("y"), z = text_.number("z");
     mesh_.points.emplace_back(x, y, z);
-    if (!normals_) return;
-    for (const char* name : {"x of the normal", "y of the normal", "z of the normal"})
-        mesh_.vertex_properties[0].values.push_back(text_.number(name));
+    if (normals_)
+        for (const char* name : {"x of the normal", "y of the normal", "z of the normal"})
+            mesh_.vertex_properties[0].values.push_back(text_.number(name));
+    if (colors_)
+        for (const char* name : {"red", "green", "blue"})
+            mesh_.vertex_properties.back().values.push_back(text_.number(name));
 }
 
 void Reader::face() {
@@ -133,16 +139,24 @@ void Reader::face() {
     append_fan(polygon_, mesh_.triangles);  // what follows is a colour
 }
 
+/// The format has 0…1; many write 0…255.
+void scale_colors(std::vector<float>& values) {
+    if (std::none_of(values.begin(), values.end(), [](float v) { return v > 1; })) return;
+    for (float& v : values) v *= 1.0f / 255;
+}
+
 TriMesh Reader::read(const Progress& progress) {
     const Counts counts = header();
     check_size(counts);
     if (normals_) mesh_.vertex_properties.push_back({"normal", 3, {}});
+    if (colors_) mesh_.vertex_properties.push_back({"color", 3, {}});
     mesh_.points.reserve(counts.vertices);
     for (std::uint64_t i = 0; i < counts.vertices; ++i) {
         line("vertex", i, counts.vertices);
         vertex();
         report(progress, i);
     }
+    if (colors_) scale_colors(mesh_.vertex_properties.back().values);
     mesh_.triangles.reserve(counts.faces);
     for (std::uint64_t i = 0; i < counts.faces; ++i) {
         line("face", i, counts.faces);
@@ -164,10 +178,16 @@ bool is_off(std::string_view bytes) {
 TriMesh read_off(const MappedFile& file, const Progress& progress) { return Reader(file).read(progress); }
 
 void write_off(const TriMesh& mesh, const Output& out) {
-    out.file.write(fmt::format("OFF\n{} {} 0\n", mesh.points.size(), mesh.triangles.size()));
+    const MeshProperty* const color = vertex_color(mesh);
+    out.file.write(
+        fmt::format("{}OFF\n{} {} 0\n", color ? "C" : "", mesh.points.size(), mesh.triangles.size()));
     write_elements(out.file, mesh.points.size(), out.progress.part(0, 0.5),
                    [&](std::size_t i, Buffer& buffer) {
                        put_point(buffer, mesh.points[i], out.options);
+                       if (color) {
+                           put_color(buffer, &color->values[3 * i]);
+                           buffer.append(std::string_view(" 1"));  // opaque
+                       }
                        buffer.push_back('\n');
                    });
     write_elements(out.file, mesh.triangles.size(), out.progress.part(0.5, 1),

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "converters/mesh_formats.h"
+#include "converters/mesh_properties.h"
 #include "converters/text_cursor.h"
 #include "vdbgeo/core/errors.h"
 
@@ -126,9 +127,28 @@ class BinaryBody {
     std::uint64_t entry_ = 0;
 };
 
-/// The name of three scalars in a row that are a vector: "a" for a_x, a_y, a_z; "normal" for nx, ny, nz.
-std::optional<std::string> vector_name(const std::vector<PlyProperty>& properties, std::size_t first) {
+/// What three scalars in a row are together.
+struct Vector {
+    std::string name;
+    float unit = 1;  // what their values are multiples of
+};
+
+/// red, green and blue of one type: of 8 or 16 bits, or floats.
+std::optional<Vector> color_of(const PlyProperty* three) {
+    constexpr const char* names[] = {"red", "green", "blue"};
+    const PlyType type = three[0].type;
+    for (std::size_t k = 0; k < 3; ++k)
+        if (three[k].name != names[k] || three[k].list_count || three[k].type != type) return {};
+    if (type == PlyType::uint8) return Vector{"color", 1.0f / 255};
+    if (type == PlyType::uint16) return Vector{"color", 1.0f / 65535};
+    if (type == PlyType::float32 || type == PlyType::float64) return Vector{"color"};
+    return {};
+}
+
+/// The vector that three scalars in a row are: "a" for a_x, a_y, a_z; "normal" for nx, ny, nz; "color".
+std::optional<Vector> vector_of(const std::vector<PlyProperty>& properties, std::size_t first) {
     if (first + 3 > properties.size()) return {};
+    if (auto color = color_of(&properties[first])) return color;
     const std::string& x = properties[first].name;
     const bool normal = x == "nx";
     if (!normal && (x.size() < 3 || x.substr(x.size() - 2) != "_x")) return {};
@@ -137,7 +157,7 @@ std::optional<std::string> vector_name(const std::vector<PlyProperty>& propertie
         const PlyProperty& p = properties[first + k];
         if (p.list_count || p.name != stem + "xyz"[k]) return {};
     }
-    return normal ? "normal" : x.substr(0, x.size() - 2);
+    return Vector{normal ? "normal" : x.substr(0, x.size() - 2)};
 }
 
 /// The scalars of an element's entries on their way to the properties of a mesh.
@@ -147,6 +167,7 @@ class Row {
     Row(const PlyElement& element, std::vector<MeshProperty>& properties, bool position)
         : values_(element.properties.size()), properties_(properties) {
         std::size_t rest_of_vector = 0;
+        float unit = 1;
         for (std::size_t i = 0; i < element.properties.size(); ++i) {
             const PlyProperty& p = element.properties[i];
             const std::size_t axis =
@@ -158,13 +179,15 @@ class Row {
             }
             if (rest_of_vector > 0) {
                 --rest_of_vector;
-            } else if (auto name = vector_name(element.properties, i)) {
-                properties_.push_back({std::move(*name), 3, {}});
+            } else if (auto vector = vector_of(element.properties, i)) {
+                properties_.push_back({std::move(vector->name), 3, {}});
                 rest_of_vector = 2;
+                unit = vector->unit;
             } else {
                 properties_.push_back({p.name, 1, {}});
+                unit = 1;
             }
-            stored_.emplace_back(i, properties_.size() - 1);
+            stored_.push_back({i, properties_.size() - 1, unit});
         }
         for (MeshProperty& p : properties_)
             p.values.reserve(element.count * static_cast<std::size_t>(p.components));
@@ -174,14 +197,22 @@ class Row {
     Vec3f point() const { return {values_[axes_[0]], values_[axes_[1]], values_[axes_[2]]}; }
     /// Appends this row to the properties.
     void store() {
-        for (const auto& [value, property] : stored_) properties_[property].values.push_back(values_[value]);
+        for (const Stored& s : stored_) {
+            const float value = values_[s.value];
+            properties_[s.property].values.push_back(s.unit == 1 ? value : value * s.unit);
+        }
     }
 
  private:
+    struct Stored {
+        std::size_t value, property;  // of the element → of the mesh
+        float unit;
+    };
+
     std::vector<float> values_;  // by property of the element; those of lists are unused
     std::vector<MeshProperty>& properties_;
     std::array<std::size_t, 3> axes_{};
-    std::vector<std::pair<std::size_t, std::size_t>> stored_;  // value → property of the mesh
+    std::vector<Stored> stored_;
 };
 
 template <class Body>
@@ -292,6 +323,7 @@ class Reader {
 std::vector<std::string> scalar_names(const MeshProperty& property) {
     const std::string& name = property.name;
     if (property.components == 1) return {name};
+    if (is_color(property)) return {"red", "green", "blue"};
     if (property.components == 3 && name == "normal") return {"nx", "ny", "nz"};
     if (property.components == 3) return {name + "_x", name + "_y", name + "_z"};
     std::vector<std::string> names;
@@ -312,7 +344,7 @@ std::string declare(const std::vector<MeshProperty>& properties, std::set<std::s
                                                in_quotes(property.name)));
             if (!taken.insert(name).second)
                 throw InvalidInput(fmt::format("{}: two properties would be called '{}'", file, name));
-            lines += fmt::format("property float {}\n", name);
+            lines += fmt::format("property {} {}\n", is_color(property) ? "uchar" : "float", name);
         }
     return lines;
 }
@@ -320,7 +352,12 @@ std::string declare(const std::vector<MeshProperty>& properties, std::set<std::s
 void put_properties(Buffer& buffer, const std::vector<MeshProperty>& properties, std::size_t element) {
     for (const MeshProperty& p : properties) {
         const std::size_t n = static_cast<std::size_t>(p.components);
-        for (std::size_t k = 0; k < n; ++k) put(buffer, p.values[element * n + k]);
+        const float* const values = &p.values[element * n];
+        for (std::size_t k = 0; k < n; ++k)
+            if (is_color(p))
+                put(buffer, color_byte(values[k]));
+            else
+                put(buffer, values[k]);
     }
 }
 

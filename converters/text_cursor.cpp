@@ -79,8 +79,10 @@ void TextCursor::expect_line_end() {
         fail(fmt::format("expected the end of the line, found {}", in_quotes(more)));
 }
 
-float TextCursor::number(const char* what) {
-    const std::string_view found = word(), digits = without_plus(found);
+float TextCursor::number(const char* what) { return number_in(word(), what); }
+
+float TextCursor::number_in(std::string_view found, const char* what) const {
+    const std::string_view digits = without_plus(found);
     float value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     const bool whole = !digits.empty() && end == digits.data() + digits.size();

@@ -32,6 +32,8 @@ class TextCursor {
     /// The next word as a number; `what` names it in the message. A float that lies between two floats
     /// becomes the nearer one; "inf" and "nan" are numbers.
     float number(const char* what);
+    /// `text`, a word of this line, as such a number.
+    float number_in(std::string_view text, const char* what) const;
     std::int64_t integer(const char* what);
     /// `text`, a part of a word of this line, as a whole number.
     std::int64_t integer_in(std::string_view text, const char* what) const;

@@ -71,9 +71,10 @@ TEST(MeshDamage, AnyFormat) {
     EXPECT_THROW(read_mesh(folder.path()), IoError);
     for (const std::string& ending : mesh_endings())
         EXPECT_EQ(refusal("", "m" + ending), "the file is empty");
-    EXPECT_EQ(
-        refusal("hello", "m.txt"),
-        "not a mesh: the content is neither PLY nor OFF and the ending is none of .ply, .obj, .off, .stl");
+    EXPECT_EQ(refusal("hello", "m.txt"),
+              "not a mesh: the content is none of PLY, OFF, glTF and VTK, and the ending none of .ply, .obj, "
+              ".off, .stl, "
+              ".vtp, .vtu, .glb");
 }
 
 TEST(MeshDamage, PlyHeaders) {
@@ -224,6 +225,7 @@ TEST(MeshDamage, Obj) {
           "line 4: expected a statement of a polygon mesh, found 'surf'"},
          {"short vertex", "v 0 0\n", "line 1: z is missing"},
          {"comma", "v 0,5 0 0\n", "line 1: x: expected a number, found '0,5'"},
+         {"colour", "v 0 0 0 1 1 x\n", "line 1: colour: expected a number, found 'x'"},
          {"NaN", "v 0 0 0\nv 0 nan 0\n", "vertex 1 has a coordinate that is not a finite number"},
          {"zero", points + "f 0 1 2\n", "line 4: a corner names vertex 0 where there are 3 so far"},
          {"too far back", points + "f -1 -2 -4\n",
@@ -256,6 +258,7 @@ TEST(MeshDamage, Off) {
           "line 2: 1000000000000 vertices and 0 faces need 6 and 8 bytes each at least, found 7 bytes in "
           "all"},
          {"short vertex", "OFF\n1 0 0\n0 0     \n", "line 3: z is missing"},
+         {"short colour", "COFF\n1 0 0\n0 0 0 1 1   \n", "line 3: blue is missing"},
          {"short normal", "NOFF\n1 0 0\n0 0 0 0 1   \n", "line 3: z of the normal is missing"},
          {"vertices missing", "OFF\n2 0 0\n0 0 0\n        \n",
           "line 5: the file ends where vertex 2 of 2 is expected"},
@@ -335,6 +338,8 @@ TEST(MeshDamage, BadMeshesAreNotWritten) {
         TriMesh mesh = tetrahedron();
         mesh.vertex_properties.push_back({name, 1, {0, 0, 0, 0}});
         expect_not_written(mesh, "m.ply");
+        if (name != std::string("a b") && name != std::string("x"))
+            for (const char* other : {"m.vtp", "m.vtu", "m.glb"}) expect_not_written(mesh, other);
     }
     TriMesh mesh = tetrahedron();
     mesh.face_properties.push_back({"vertex_indices", 1, {0, 0, 0, 0}});

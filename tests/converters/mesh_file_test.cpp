@@ -13,6 +13,7 @@
 #include <map>
 #include <random>
 #include <thread>
+#include <tuple>
 
 #include "tests/support/data.h"
 #include "tests/support/temp_folder.h"
@@ -177,6 +178,107 @@ TEST(MeshFile, PlyKeepsProperties) {
     expect_same_properties(back.face_properties, mesh.face_properties);
 }
 
+TEST(MeshFile, VtkKeepsProperties) {
+    TriMesh mesh = awkward_mesh();
+    add_properties(mesh);
+    mesh.vertex_properties.push_back({"five <&> parts", 5, std::vector<float>(5 * mesh.points.size(), 0.5f)});
+    mesh.face_properties.push_back({"color", 3, std::vector<float>(3 * mesh.triangles.size(), 0.3f)});
+    const TempFolder folder;
+    for (const char* name : {"m.vtp", "m.vtu"}) {
+        write_mesh(mesh, folder / name);
+        const TriMesh back = read_mesh(folder / name);
+        expect_same_properties(back.vertex_properties, mesh.vertex_properties);
+        expect_same_properties(back.face_properties, mesh.face_properties);
+    }
+}
+
+TEST(MeshFile, GlbKeepsPropertiesOfVertices) {
+    TriMesh mesh = awkward_mesh();
+    add_properties(mesh);
+    mesh.vertex_properties.push_back({"a b", 2, std::vector<float>(2 * mesh.points.size(), 0.5f)});
+    const TempFolder folder;
+    write_mesh(mesh, folder / "m.glb");
+    expect_same_properties(read_mesh(folder / "m.glb").vertex_properties, mesh.vertex_properties);
+    mesh.vertex_properties = {{"five", 5, std::vector<float>(5 * mesh.points.size())}};
+    for (std::size_t i = 0; i < mesh.vertex_properties[0].values.size(); ++i)
+        mesh.vertex_properties[0].values[i] = static_cast<float>(i);
+    write_mesh(mesh, folder / "m.glb");
+    const TriMesh back = read_mesh(folder / "m.glb");
+    ASSERT_EQ(back.vertex_properties.size(), 5u);
+    EXPECT_EQ(back.find_vertex_property("five_3")->values[2], 13);
+}
+
+TEST(MeshFile, VertexColours) {
+    TriMesh mesh;
+    mesh.points = {Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0)};
+    mesh.triangles = {{0, 1, 2}};
+    std::vector<float> bytes;
+    for (const int b : {0, 255, 1, 254, 127, 128, 51, 3, 77})
+        bytes.push_back(static_cast<float>(b) * (1.0f / 255));
+    mesh.vertex_properties = {{"H", 1, {1, 2, 3}}, {"color", 3, bytes}, {"K", 1, {4, 5, 6}}};
+    mesh.face_properties = {{"color", 3, {1, 0, 1}}};
+    const TempFolder folder;
+    for (const char* ending : {".ply", ".obj", ".off", ".vtp", ".vtu", ".glb"}) {
+        SCOPED_TRACE(ending);
+        const auto file = folder / (std::string("m") + ending);
+        write_mesh(mesh, file);
+        const TriMesh back = read_mesh(file);
+        ASSERT_NE(back.find_vertex_property("color"), nullptr);
+        EXPECT_EQ(back.find_vertex_property("color")->values, bytes);
+    }
+    EXPECT_NE(
+        read_bytes(folder / "m.ply").find("property uchar red\nproperty uchar green\nproperty uchar blue\n"),
+        std::string::npos);
+    const TriMesh ply = read_mesh(folder / "m.ply");
+    expect_same_properties(ply.vertex_properties, mesh.vertex_properties);
+    expect_same_properties(ply.face_properties, mesh.face_properties);
+    // What is no colour is clipped.
+    mesh.vertex_properties = {{"color", 3, {-1, 2, NAN, 0, 0, 0, 0, 0, 0}}};
+    write_mesh(mesh, folder / "m.obj");
+    EXPECT_NE(read_bytes(folder / "m.obj").find("v 0 0 0 0 1 0\n"), std::string::npos);
+    write_mesh(mesh, folder / "m.ply");
+    EXPECT_EQ(read_mesh(folder / "m.ply").vertex_properties[0].values[1], 1);
+    // A property of that name and another shape is none.
+    mesh.vertex_properties = {{"color", 1, {7, 8, 9}}};
+    for (const char* ending : {".ply", ".vtp", ".glb"}) {
+        write_mesh(mesh, folder / (std::string("n") + ending));
+        expect_same_properties(read_mesh(folder / (std::string("n") + ending)).vertex_properties,
+                               mesh.vertex_properties);
+    }
+}
+
+TEST(MeshFile, ColoursOfOtherPrograms) {
+    const std::string faces = "3 0 1 2\n";
+    const auto color = [](const TriMesh& mesh) { return mesh.find_vertex_property("color")->values[1]; };
+    EXPECT_EQ(color(read_text("COFF\n3 1 0\n0 0 0 0 51 255 255\n1 0 0 0 0 0 255\n0 1 0 1 2 3 4\n" + faces,
+                              "m.off")),
+              51 * (1.0f / 255));
+    EXPECT_EQ(color(read_text(
+                  "CNOFF\n3 1 0\n0 0 0 0 0 1 0 0.25 1 1\n1 0 0 0 0 1 0 0 0 1\n0 1 0 0 0 1 1 0 1 1\n" + faces,
+                  "m.off")),
+              0.25f);
+    const std::string head =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+        "property float z\n";
+    for (const auto& [type, values, green] :
+         {std::tuple("uchar", "0 51 0", 51 * (1.0f / 255)),
+          std::tuple("ushort", "0 13107 0", 13107 * (1.0f / 65535)), std::tuple("float", "0 0.5 0", 0.5f)}) {
+        std::string text = head;
+        for (const char* name : {"red", "green", "blue"})
+            text += std::string("property ") + type + " " + name + "\n";
+        const TriMesh mesh =
+            read_text(text + "property uchar alpha\nend_header\n0 0 0 " + values + " 9\n", "m.ply");
+        EXPECT_EQ(color(mesh), green);
+        EXPECT_EQ(mesh.find_vertex_property("alpha")->values[0], 9);
+    }
+    // Not all vertices of an OBJ file have one: none has.
+    EXPECT_TRUE(
+        read_text("v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0 1 1 1\nf 1 2 3\n", "m.obj").vertex_properties.empty());
+    EXPECT_TRUE(
+        read_text("v 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\nf 1 2 3\n", "m.obj").vertex_properties.empty());
+    EXPECT_TRUE(read_text("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", "m.obj").vertex_properties.empty());
+}
+
 TEST(MeshFile, SecondWriteGivesTheSameBytesForAnyThreadCount) {
     TriMesh mesh = awkward_mesh();
     while (mesh.triangles.size() < 600000)
@@ -207,7 +309,8 @@ TEST(MeshFile, EmptyMeshesAreMeshes) {
 }
 
 TEST(MeshFile, EndingsAreTakenInUpperCaseAndNamedOtherwise) {
-    EXPECT_EQ(mesh_endings(), (std::vector<std::string>{".ply", ".obj", ".off", ".stl"}));
+    EXPECT_EQ(mesh_endings(),
+              (std::vector<std::string>{".ply", ".obj", ".off", ".stl", ".vtp", ".vtu", ".glb"}));
     EXPECT_TRUE(is_mesh_ending("a/b.STL"));
     EXPECT_TRUE(is_mesh_ending("b.ply"));
     EXPECT_FALSE(is_mesh_ending("ply"));
@@ -217,8 +320,10 @@ TEST(MeshFile, EndingsAreTakenInUpperCaseAndNamedOtherwise) {
         write_mesh(TriMesh(), "m.mrc");
         FAIL();
     } catch (const InvalidInput& error) {
-        EXPECT_STREQ(error.what(),
-                     "m.mrc: not the name of a mesh file: expected an ending among .ply, .obj, .off, .stl");
+        EXPECT_STREQ(
+            error.what(),
+            "m.mrc: not the name of a mesh file: expected an ending among .ply, .obj, .off, .stl, .vtp, "
+            ".vtu, .glb");
     }
 }
 
@@ -384,7 +489,7 @@ TEST(MeshFile, OffInEveryForm) {
         const TriMesh mesh = read_text(text, "m.off");
         EXPECT_EQ(coordinates(mesh), square) << text;
         EXPECT_EQ(corners(mesh), square_fan) << text;
-        EXPECT_TRUE(mesh.vertex_properties.empty());
+        EXPECT_EQ(mesh.vertex_properties.empty(), text[0] != 'C');
     }
     const TriMesh normals = read_text("NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 1 0\n1 1 0 1 0 0\n3 0 1 2", "m.off");
     ASSERT_NE(normals.find_vertex_property("normal"), nullptr);

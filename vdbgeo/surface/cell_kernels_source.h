@@ -135,20 +135,29 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
     }
 }
 
-/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there: `place` is the
-/// samples' own in the block.
-void place_on_edges(const float* here, const float* next, const double place[dim], int axis,
+// Of the eight samples of a row; the compiler makes of them what the CPU has.
+using Floats = float __attribute__((vector_size(dim * sizeof(float))));
+using Doubles = double __attribute__((vector_size(dim * sizeof(double))));
+
+/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of the
+/// samples in the block.
+void place_on_edges(const float* here, const float* next, const Doubles& place, int axis,
                     const DiagonalPlacing& placing, float out[dim]) {
-    const double iso = placing.isovalue, least = placing.nearest, most = 1 - placing.nearest;
-    const double origin = placing.origin[axis], step = placing.step[axis], index = placing.index[axis];
-    for (int z = 0; z < dim; ++z) {
-        const double low = here[z] - iso, high = next[z] - iso;
-        double t = low / (low - high);
-        t = (t >= 0) & (t <= 1) ? t : 0.5;  // a sample is not a finite number
-        t = t > least ? t : least;
-        t = t < most ? t : most;
-        out[z] = static_cast<float>(origin + step * (index + (place[z] + t)));
-    }
+    const double iso = placing.isovalue;
+    const Doubles zero{}, one = zero + 1, middle = zero + 0.5, least = zero + placing.nearest,
+                  most = one - placing.nearest;
+    Floats from, to;
+    __builtin_memcpy(&from, here, sizeof(from));
+    __builtin_memcpy(&to, next, sizeof(to));
+    const Doubles low = __builtin_convertvector(from, Doubles) - iso,
+                  high = __builtin_convertvector(to, Doubles) - iso;
+    Doubles t = low / (low - high);
+    t = (t >= zero) & (t <= one) ? t : middle;  // a sample is not a finite number
+    t = t > least ? t : least;
+    t = t < most ? t : most;
+    t = placing.origin[axis] + placing.step[axis] * (placing.index[axis] + (place + t));
+    const Floats at = __builtin_convertvector(t, Floats);
+    __builtin_memcpy(out, &at, sizeof(at));
 }
 
 void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalPlacing& placing, float* out) {
@@ -157,7 +166,7 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
     const auto coordinate = [&](int axis, int i) {
         return static_cast<float>(placing.origin[axis] + placing.step[axis] * (placing.index[axis] + i));
     };
-    double zs[dim];
+    Doubles zs;
     alignas(16) float above[dim][4] = {};  // what z adds to the place of a sample
     for (int z = 0; z < dim; ++z) zs[z] = z, above[z][2] = coordinate(2, z);
     for (int x = 0; x < dim; ++x)
@@ -166,10 +175,9 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
             if (!crossed) continue;
             const float* here = samples + x * layer + y * row;
             alignas(64) float moved[4][dim];
-            double xs[dim], ys[dim];
-            for (int z = 0; z < dim; ++z) xs[z] = x, ys[z] = y;
-            place_on_edges(here, here + layer, xs, 0, placing, moved[0]);
-            place_on_edges(here, here + row, ys, 1, placing, moved[1]);
+            const Doubles zeros{};
+            place_on_edges(here, here + layer, zeros + x, 0, placing, moved[0]);
+            place_on_edges(here, here + row, zeros + y, 1, placing, moved[1]);
             place_on_edges(here, here + 1, zs, 2, placing, moved[2]);
             const float at_x = coordinate(0, x), at_y = coordinate(1, y);
 #if defined(__SSE2__)

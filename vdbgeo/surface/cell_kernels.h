@@ -73,14 +73,38 @@ struct DiagonalPlacing {
     const float* end;   ///< writes may reach one float further than the vertices, but not to here
 };
 
+/// A cell whose pattern its corner values are to settle.
+struct OpenCell {
+    std::uint16_t cell;  ///< 64·x + 8·y + z
+    std::uint16_t item;  ///< its place among the block's active cells
+};
+
+/// Whether the arcs of a cell's slices z = t change while the slice's corners (0, 0) and (1, 1), or the other two,
+/// alone are inside.
+struct SliceTest {
+    OpenCell open;
+    std::uint8_t diagonal;  ///< 0, 1
+    bool change;            ///< the answer
+};
+
+constexpr int tests_at_once = 8;
+
+struct Counts {
+    int cells, open;
+};
+
 struct Kernels {
     const char* name;
     /// Bit 8·y + z of word x: values[64·x + 8·y + z] ≥ isovalue.
     void (*sign_words)(const float* values, float isovalue, BlockBits words);
     /// The active cells' patterns by their keys: `of_key` is a PatternTable's, corner c's signs are in
-    /// corners[c]. Returns how many cells there are.
-    int (*list_patterns)(const BlockBits active, const std::uint64_t* const corners[8], const FaceBits* faces,
-                         const std::uint16_t* of_key, std::uint16_t* patterns);
+    /// corners[c]. Those with the highest bit set are listed. Returns how many cells there are, and of the list.
+    Counts (*list_patterns)(const BlockBits active, const std::uint64_t* const corners[8], const FaceBits* faces,
+                            const std::uint16_t* of_key, std::uint16_t* patterns, OpenCell* open);
+    /// Settles the tests. The sign changes along z bound an interval of t; in it the arcs change at a zero of a
+    /// quadratic. Exact, in place of the case-by-case tests of Chernyaev (1995). `count` is a multiple of
+    /// `tests_at_once`.
+    void (*settle)(const float* samples, float isovalue, SliceTest* tests, int count);
     /// Takes the vertices of the block (side 0) or of an upper neighbour (bit a: along axis a) that lie on the
     /// block's cells.
     void (*take_numbers)(const EdgeBits& edges, std::uint32_t first_vertex, int side, VertexNumbers& numbers);

@@ -41,9 +41,15 @@ void sign_words(const float* values, float isovalue, BlockBits words) {
     }
 }
 
-int list_patterns(const BlockBits active, const std::uint64_t* const corners[8], const FaceBits* faces,
-                  const std::uint16_t* of_key, std::uint16_t* patterns) {
-    std::uint16_t* out = patterns;
+Counts list_patterns(const BlockBits active, const std::uint64_t* const corners[8], const FaceBits* faces,
+                     const std::uint16_t* of_key, std::uint16_t* patterns, OpenCell* open) {
+    Counts n{0, 0};
+    const auto list = [&](int x, int place, std::uint16_t pattern) {
+        patterns[n.cells] = pattern;
+        open[n.open] = {static_cast<std::uint16_t>(64 * x + place), static_cast<std::uint16_t>(n.cells)};
+        n.open += pattern >> 15;
+        ++n.cells;
+    };
     for (int x = 0; x < dim; ++x) {
         if (!active[x]) continue;
 #if defined(__AVX512BW__)
@@ -65,8 +71,10 @@ int list_patterns(const BlockBits active, const std::uint64_t* const corners[8],
                                _mm512_or_si512(_mm512_cvtepu8_epi16(signs),
                                                _mm512_slli_epi16(_mm512_cvtepu8_epi16(joined), 8)));
         }
-        for (std::uint64_t left = active[x]; left; left &= left - 1)
-            *out++ = of_key[keys[__builtin_ctzll(left)]];
+        for (std::uint64_t left = active[x]; left; left &= left - 1) {
+            const int i = __builtin_ctzll(left);
+            list(x, i, of_key[keys[i]]);
+        }
 #else
         for (std::uint64_t left = active[x]; left; left &= left - 1) {
             const int i = __builtin_ctzll(left);
@@ -77,11 +85,66 @@ int list_patterns(const BlockBits active, const std::uint64_t* const corners[8],
                     key |= static_cast<unsigned>(faces->lower[a][x] >> i & 1) << (8 + 2 * a);
                     key |= static_cast<unsigned>(faces->upper[a][x] >> i & 1) << (9 + 2 * a);
                 }
-            *out++ = of_key[key];
+            list(x, i, of_key[key]);
         }
 #endif
     }
-    return static_cast<int>(out - patterns);
+    return n;
+}
+
+// Eight at a time; the compiler makes of them what the CPU has.
+using Floats = float __attribute__((vector_size(dim * sizeof(float))));
+using Doubles = double __attribute__((vector_size(dim * sizeof(double))));
+using Masks = long long __attribute__((vector_size(dim * sizeof(long long))));
+
+void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
+    constexpr int row = sample_stride, layer = (dim + 1) * sample_stride;
+    constexpr int column[4] = {0, layer, layer + row, row};  // around the slice
+    const Doubles zero{};
+    for (SliceTest* test = tests; test < tests + count; test += tests_at_once) {
+        alignas(64) float corner[2][4][tests_at_once];
+        alignas(64) long long first_diagonal[tests_at_once];
+        for (int i = 0; i < tests_at_once; ++i) {
+            const int cell = test[i].open.cell;
+            const float* at = samples + (cell >> 6) * layer + (cell >> 3 & 7) * row + (cell & 7);
+            for (int k = 0; k < 4; ++k)
+                corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
+            first_diagonal[i] = test[i].diagonal ? 0 : -1;
+        }
+        Masks wanted;  // column k is inside in the slices looked at
+        __builtin_memcpy(&wanted, first_diagonal, sizeof(wanted));
+        Doubles low[4], rise[4], from = zero, to = zero + 1;
+        for (int k = 0; k < 4; ++k, wanted = ~wanted) {
+            Floats below, above;
+            __builtin_memcpy(&below, corner[0][k], sizeof(below));
+            __builtin_memcpy(&above, corner[1][k], sizeof(above));
+            low[k] = __builtin_convertvector(below, Doubles) - static_cast<double>(isovalue);
+            const Doubles high = __builtin_convertvector(above, Doubles) - static_cast<double>(isovalue);
+            rise[k] = high - low[k];
+            const Doubles t = low[k] / (low[k] - high);
+            to = (((high >= zero) ^ wanted) & (t < to)) != 0 ? t : to;
+            from = (((low[k] >= zero) ^ wanted) & (from < t)) != 0 ? t : from;
+        }
+        // Inside minus outside diagonal product, up to the sign: the arcs change where this does.
+        const auto decide = [&](const Doubles& t, Doubles& out) {
+            out = (low[0] + t * rise[0]) * (low[2] + t * rise[2]) -
+                  (low[1] + t * rise[1]) * (low[3] + t * rise[3]);
+        };
+        Doubles q0, q1, half, at_from, at_to, at_extreme;
+        decide(zero, q0);
+        decide(zero + 1, q1);
+        decide(zero + 0.5, half);
+        const Doubles curve = 2 * (q0 + q1 - 2 * half), slope = q1 - q0 - curve;  // q0 + slope t + curve t²
+        const Doubles extreme = -slope / (2 * curve);
+        decide(from, at_from);
+        decide(to, at_to);
+        decide(extreme, at_extreme);
+        const Masks begin = at_from >= zero, end = at_to >= zero, between = at_extreme >= zero;
+        const Masks change = (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
+        alignas(64) long long answer[tests_at_once];
+        __builtin_memcpy(answer, &change, sizeof(answer));
+        for (int i = 0; i < tests_at_once; ++i) test[i].change = answer[i] != 0;
+    }
 }
 
 /// Every fourth bit of a word: bit 4·z is bit z.
@@ -134,10 +197,6 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
         }
     }
 }
-
-// Of the eight samples of a row; the compiler makes of them what the CPU has.
-using Floats = float __attribute__((vector_size(dim * sizeof(float))));
-using Doubles = double __attribute__((vector_size(dim * sizeof(double))));
 
 /// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of the
 /// samples in the block.
@@ -260,7 +319,7 @@ void draw(const DrawingTask& task) {
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), sign_words,     list_patterns,
+const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), sign_words,     list_patterns, settle,
                                 take_numbers,                place_vertices, draw};
 
 }  // namespace vdbgeo::cell

@@ -264,12 +264,6 @@ constexpr int column[4] = {0, 1, 3, 2};
 constexpr int bottom_edge[4] = {0, 5, 1, 4};  // x at y=0, y at x=1, x at y=1, y at x=0
 constexpr int top_offset = 2;                 // to the same edges at z=1
 
-constexpr PatternId none = 0xFFFF;
-
-/// For each pattern without a tunnel the one with it, that a change of the arcs makes in a slice whose corners
-/// 0 and 2 alone (first), or 1 and 3 alone, are inside.
-using TunnelPatterns = std::array<PatternId, 2>;
-
 /// Whether corner k is inside in a slice that alternates in sign.
 constexpr bool is_inside_slice(int k, int diagonal) { return (k & 1) == diagonal; }
 
@@ -299,8 +293,6 @@ std::optional<std::pair<int, int>> loops_of_slice(int sign_case, int diagonal,
 }
 
 struct Tables : PatternTable {
-    std::vector<TunnelPatterns> tunnels;
-
     Tables() {
         for (int c = 0; c < 256; ++c) {
             int ambiguous = 0;
@@ -315,7 +307,7 @@ struct Tables : PatternTable {
 
     PatternId add_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b) {
         patterns.push_back(make_pattern(loops, tunnel_a, tunnel_b));
-        tunnels.push_back({none, none});
+        tunnels.push_back({no_pattern, no_pattern});
         return static_cast<PatternId>(patterns.size() - 1);
     }
 
@@ -337,49 +329,11 @@ struct Tables : PatternTable {
     }
 };
 
-const Tables& tables() {
-    static const Tables instance;
-    return instance;
-}
-
-/// Inside minus outside diagonal product of the slice at t, up to the sign: its arcs change where this does.
-double decider(const std::array<double, corners>& d, double t) {
-    double v[4];
-    for (int k = 0; k < 4; ++k) v[k] = d[column[k]] + t * (d[column[k] + 4] - d[column[k]]);
-    return v[0] * v[2] - v[1] * v[3];
-}
-
-/// Whether the arcs change in the slices whose corners alternate in sign, with the given diagonal inside.
-bool arcs_change(const std::array<double, corners>& d, int diagonal) {
-    double from = 0, to = 1;
-    for (int k = 0; k < 4; ++k) {
-        const double low = d[column[k]], high = d[column[k] + 4];
-        const bool wanted = is_inside_slice(k, diagonal);
-        const bool at_bottom = (low >= 0) == wanted, at_top = (high >= 0) == wanted;
-        const double t = low / (low - high);
-        to = at_top ? to : std::min(to, t);
-        from = at_bottom ? from : std::max(from, t);
-    }
-    if (!(from < to)) return false;
-    const double q0 = decider(d, 0), q1 = decider(d, 1), half = decider(d, 0.5);
-    const double curve = 2 * (q0 + q1 - 2 * half), slope = q1 - q0 - curve;  // q0 + slope t + curve t²
-    const double begin = from == 0 ? q0 : decider(d, from), end = to == 1 ? q1 : decider(d, to);
-    if ((begin >= 0) != (end >= 0)) return true;
-    if (curve == 0) return false;
-    const double extreme = -slope / (2 * curve);
-    return extreme > from && extreme < to && (decider(d, extreme) >= 0) != (begin >= 0);
-}
-
 }  // namespace
 
-const PatternTable& pattern_table() { return tables(); }
-
-PatternId settle(PatternId id, const std::array<double, corners>& d) {
-    id &= static_cast<PatternId>(~unsettled);
-    const TunnelPatterns& tunnels = tables().tunnels[id];
-    for (int diagonal = 0; diagonal < 2; ++diagonal)
-        if (tunnels[diagonal] != none && arcs_change(d, diagonal)) return tunnels[diagonal];
-    return id;
+const PatternTable& pattern_table() {
+    static const Tables tables;
+    return tables;
 }
 
 }  // namespace vdbgeo::cell

@@ -32,13 +32,20 @@ struct Pattern {
 };
 
 /// Number of a pattern in the table; with the bit `unsettled` the one without a tunnel, where the corner values
-/// tell whether there is one: settle() does.
+/// tell whether there is one.
 using PatternId = std::uint16_t;
-constexpr PatternId unsettled = 0x8000;
+constexpr PatternId unsettled = 0x8000, no_pattern = 0xFFFF;
+
+/// For a pattern without a tunnel the ones that have it. Two loops are joined by a tunnel where the level set of a
+/// slice z = t changes from one pair of arcs to the other. It can while the slice's corners alternate in sign:
+/// the first pattern is that of a change while its corners (0, 0) and (1, 1) are inside, the second that of a
+/// change while the other two are; no_pattern where neither would join loops.
+using TunnelPatterns = std::array<PatternId, 2>;
 
 /// All patterns, and which of them a cell has.
 struct PatternTable {
     std::vector<Pattern> patterns;
+    std::vector<TunnelPatterns> tunnels;  ///< of each pattern
     /// By the cell's key: bit c, corner c is inside; bit 8 + f, the inside corners of face f are joined across
     /// it. The latter counts where the face is ambiguous (inside corners at both ends of one diagonal alone)
     /// and is ignored elsewhere.
@@ -52,11 +59,5 @@ const PatternTable& pattern_table();
 inline bool joined_across_face(double inside_a, double inside_b, double outside_a, double outside_b) {
     return inside_a * inside_b >= outside_a * outside_b;
 }
-
-/// The pattern with the topology of the trilinear interpolant, for an `unsettled` one; `d` are the corner values
-/// minus the isovalue. Two loops are joined by a tunnel where the level set of a slice z = t changes from one
-/// pair of arcs to the other: while the slice's corners alternate in sign, which is an interval of t, at a zero
-/// of a quadratic. Exact, in place of the case-by-case tests of Chernyaev (1995).
-PatternId settle(PatternId id, const std::array<double, corners>& d);
 
 }  // namespace vdbgeo::cell

@@ -1,6 +1,8 @@
 #include "vdbgeo/surface/marching_cubes.h"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -62,6 +64,17 @@ class DrawingTable {
 const DrawingTable& drawing_table(bool mirrored) {
     static const DrawingTable direct(false), reversed(true);
     return mirrored ? reversed : direct;
+}
+
+/// Has the pages of an array that is about to be written put there by one call, which costs less than a fault
+/// for each. Nothing depends on it.
+void fault_in(const void* begin, const void* end) {
+#ifdef MADV_POPULATE_WRITE
+    static const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    const auto first = reinterpret_cast<std::uintptr_t>(begin) & ~(page - 1),
+               last = reinterpret_cast<std::uintptr_t>(end) & ~(page - 1);
+    if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_POPULATE_WRITE);
+#endif
 }
 
 /// The extraction of one map, in two passes over the crossed blocks: count, then fill.
@@ -136,13 +149,13 @@ class Extraction {
         }
         const std::uint64_t* const corners[8] = {signs.here, signs.here + 1, signs.y,  signs.y + 1,
                                                  signs.z,    signs.z + 1,    signs.yz, signs.yz + 1};
-        const int count = kernels_.list_patterns(out.active, corners, ambiguous ? &faces : nullptr,
-                                                 cell::pattern_table().of_key.data(), patterns);
-        cell::PatternId any = 0;
-        for (int i = 0; i < count; ++i) any |= patterns[i];
-        if (any & cell::unsettled) {
+        std::array<cell::OpenCell, cell::block_cells> open;
+        const auto [count, open_count] =
+            kernels_.list_patterns(out.active, corners, ambiguous ? &faces : nullptr,
+                                   cell::pattern_table().of_key.data(), patterns, open.data());
+        if (open_count > 0) {
             if (!ambiguous) blocks_.load(b, samples);
-            settle_cells(out.active, samples, patterns);
+            settle(open.data(), open_count, samples, patterns);
         }
         std::uint32_t sizes = 0;
         for (int i = 0; i < count; ++i) sizes += table_.size(patterns[i]);
@@ -152,17 +165,28 @@ class Extraction {
         return patterns + count;
     }
 
-    void settle_cells(const cell::BlockBits active, const BlockSamples& s, cell::PatternId* pattern) const {
-        for (int x = 0; x < dim; ++x)
-            for (std::uint64_t left = active[x]; left; left &= left - 1, ++pattern) {
-                if (!(*pattern & cell::unsettled)) continue;
-                const int i = __builtin_ctzll(left), y = i >> 3, z = i & 7;
-                std::array<double, 8> d;
-                for (int c = 0; c < 8; ++c)
-                    d[static_cast<std::size_t>(c)] =
-                        s.values[x + (c & 1)][y + (c >> 1 & 1)][z + (c >> 2 & 1)] - isovalue_;
-                *pattern = cell::settle(*pattern, d);
+    /// Finds which of the cells have tunnels.
+    void settle(const cell::OpenCell* open, int count, const BlockSamples& samples,
+                cell::PatternId* patterns) const {
+        std::array<cell::SliceTest, 2 * cell::block_cells + cell::tests_at_once> tests;
+        const auto tunnels = [&](const cell::OpenCell& c) -> const cell::TunnelPatterns& {
+            return cell::pattern_table().tunnels[patterns[c.item] & ~cell::unsettled];
+        };
+        std::size_t n = 0;
+        for (int i = 0; i < count; ++i)
+            for (std::uint8_t diagonal = 0; diagonal < 2; ++diagonal) {
+                tests[n] = {open[i], diagonal, false};
+                n += tunnels(open[i])[diagonal] != cell::no_pattern;
             }
+        std::size_t full = n;
+        while (full % cell::tests_at_once) tests[full++] = tests[n - 1];
+        kernels_.settle(samples.values[0][0], static_cast<float>(isovalue_), tests.data(),
+                        static_cast<int>(full));
+        for (std::size_t i = 0; i < n; ++i) {
+            cell::PatternId& pattern = patterns[tests[i].open.item];
+            if (tests[i].change && (pattern & cell::unsettled)) pattern = tunnels(tests[i].open)[tests[i].diagonal];
+        }
+        for (int i = 0; i < count; ++i) patterns[open[i].item] &= static_cast<cell::PatternId>(~cell::unsettled);
     }
 
     std::pair<std::uint64_t, std::uint64_t> number() {
@@ -198,6 +222,8 @@ class Extraction {
             mesh_.points.data()->data() + 3 * (last ? mesh_.points.size() : cells_[end].first_vertex);
         filling.end_of_triangles =
             mesh_.triangles.data()->data() + 3 * (last ? mesh_.triangles.size() : cells_[end].first_triangle);
+        fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
+        fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
         const cell::PatternId* patterns = patterns_[begin / chunk].data();
         for (std::size_t b = begin; b < end; ++b) {
             filling.block = b;
@@ -258,13 +284,6 @@ class Extraction {
         return on_edge(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1), e / 4, crossing(value(c), value(d)));
     }
 
-    Vec3d mean_crossing(const BlockSamples& s, int x, int y, int z, unsigned edges) const {
-        Vec3d sum = Vec3d::Zero();
-        for (unsigned left = edges; left; left &= left - 1)
-            sum += crossing_on(s, x, y, z, __builtin_ctz(left));
-        return sum / __builtin_popcount(edges);
-    }
-
     void make_triangles(Filling& filling, const cell::PatternId* patterns) {
         for (int side = 0; side < 7; ++side) {  // no cell has an edge of the block above along all axes
             const std::int64_t n = blocks_.neighbour(filling.block, side);
@@ -288,10 +307,27 @@ class Extraction {
     /// A cell with vertices inside.
     void draw_special(Filling& filling, int x, int y, int z, int pattern, VertexId* numbers, VertexId* out) {
         const Pattern& p = cell::pattern_table().patterns[static_cast<std::size_t>(pattern)];
+        unsigned all = 0;
+        for (std::size_t k = 0; k < p.centre_count; ++k) all |= p.centre_edges[k] | p.around_edges[k];
+        std::array<Vec3d, cell::edges> crossings;
+        for (unsigned left = all; left; left &= left - 1) {
+            const int e = __builtin_ctz(left);
+            crossings[static_cast<std::size_t>(e)] = crossing_on(filling.samples, x, y, z, e);
+        }
+        const auto mean = [&](unsigned edges) -> Vec3d {
+            Vec3d sum = Vec3d::Zero();
+            int count = 0;
+            for (unsigned left = edges; left; left &= left - 1, ++count)
+                sum += crossings[static_cast<std::size_t>(__builtin_ctz(left))];
+            return sum / count;
+        };
+        unsigned around = 0;
+        Vec3d around_mean = Vec3d::Zero();
         for (std::size_t k = 0; k < p.centre_count; ++k) {
-            const Vec3d place = 0.5 * (mean_crossing(filling.samples, x, y, z, p.centre_edges[k]) +
-                                       mean_crossing(filling.samples, x, y, z, p.around_edges[k]));
-            mesh_.points[filling.extra] = world(blocks_.origin(filling.block), place);
+            if (around != p.around_edges[k]) around_mean = mean(around = p.around_edges[k]);
+            const Vec3d centre = p.centre_edges[k] == around ? around_mean : mean(p.centre_edges[k]);
+            mesh_.points[filling.extra] =
+                world(blocks_.origin(filling.block), 0.5 * (centre + around_mean));
             numbers[DrawingTable::place_of(cell::edges + static_cast<int>(k))] =
                 static_cast<VertexId>(filling.extra++);
         }

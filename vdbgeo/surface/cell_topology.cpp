@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace vdbgeo::cell {
@@ -257,175 +258,82 @@ Pattern make_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b)
     return p;
 }
 
-/// One sign case with its ambiguous faces settled: the loops, and a pattern for every pair of them that a
-/// tunnel may join.
-struct Entry {
-    std::array<std::int8_t, edges> loop_of_edge{};
-    int loop_count = 0;
-    Pattern separate;
-    std::array<std::array<int, 4>, 4> tunnel{};  // index into Tables::tunnels
-};
+// A slice z = t of the cell: its corners in cyclic order, as the cell's corners below them, and the edges of
+// the cell below its sides.
+constexpr int column[4] = {0, 1, 3, 2};
+constexpr int bottom_edge[4] = {0, 5, 1, 4};  // x at y=0, y at x=1, x at y=1, y at x=0
+constexpr int top_offset = 2;                 // to the same edges at z=1
 
-struct Tables {
-    std::array<std::array<std::uint8_t, faces>, 256> ambiguous{};  // faces, in order
-    std::array<std::uint8_t, 256> ambiguous_count{};
-    std::array<int, 256> first{};  // entry of the case with no ambiguous face joined
-    std::vector<Entry> entries;
-    std::vector<Pattern> tunnels;
+/// Whether corner k is inside in a slice that alternates in sign.
+constexpr bool is_inside_slice(int k, int diagonal) { return (k & 1) == diagonal; }
 
-    Tables() {
-        for (int c = 0; c < 256; ++c) {
-            for (int f = 0; f < faces; ++f)
-                if (is_ambiguous(c, f)) ambiguous[c][ambiguous_count[c]++] = static_cast<std::uint8_t>(f);
-            first[c] = static_cast<int>(entries.size());
-            for (int bits = 0; bits < 1 << ambiguous_count[c]; ++bits) entries.push_back(make_entry(c, bits));
-        }
+/// The two loops that the arcs of an alternating slice belong to; nothing where the cell has no such slice or
+/// all belong to one. Along a side face the arcs' ends follow a contour, which is part of one loop, so arcs of
+/// two loops lie in one piece only where they meet inside the cell.
+std::optional<std::pair<int, int>> loops_of_slice(int sign_case, int diagonal,
+                                                  const std::array<int, edges>& loop_of_edge) {
+    std::array<bool, 4> from_bottom, to_top;
+    for (int k = 0; k < 4; ++k) {
+        from_bottom[k] = inside(sign_case, column[k]) == is_inside_slice(k, diagonal);
+        to_top[k] = inside(sign_case, column[k] + 4) == is_inside_slice(k, diagonal);
+        if (!from_bottom[k] && !to_top[k]) return std::nullopt;
     }
-
-    Entry make_entry(int sign_case, int bits) {
-        int joined = 0;
-        for (int k = 0; k < ambiguous_count[sign_case]; ++k)
-            if (bits >> k & 1) joined |= 1 << ambiguous[sign_case][k];
-        const std::vector<Loop> loops = trace_loops(sign_case, joined);
-        Entry entry;
-        entry.loop_count = static_cast<int>(loops.size());
-        entry.loop_of_edge.fill(-1);
-        for (int k = 0; k < entry.loop_count; ++k)
-            for (const int e : loops[k]) entry.loop_of_edge[e] = static_cast<std::int8_t>(k);
-        entry.separate = make_pattern(loops, -1, -1);
-        for (int a = 0; a < entry.loop_count; ++a)
-            for (int b = a + 1; b < entry.loop_count; ++b) {
-                entry.tunnel[a][b] = static_cast<int>(tunnels.size());
-                tunnels.push_back(make_pattern(loops, a, b));
-            }
-        return entry;
+    std::optional<std::pair<int, int>> pair;
+    int first = -1;
+    for (int k = 0; k < 4; ++k) {
+        const int next = (k + 1) % 4;
+        const int edge = from_bottom[k] && from_bottom[next] ? bottom_edge[k]
+                         : to_top[k] && to_top[next]         ? bottom_edge[k] + top_offset
+                                                             : 8 + column[k];
+        const int loop = loop_of_edge[edge];
+        if (first < 0) first = loop;
+        if (loop != first && !pair) pair = std::minmax({first, loop});
     }
-};
-
-const Tables& tables() {
-    static const Tables instance;
-    return instance;
+    return pair;
 }
 
-/// The loops that belong to one connected piece of the level set, found by sweeping the slice z = t.
-class Sweep {
- public:
-    Sweep(const Entry& entry, const std::array<double, corners>& d) : entry_(entry), d_(d) {
-        for (int k = 0; k < 4; ++k) group_[k] = k;
-    }
-
-    /// Follows the arcs of the slice's level set from t = 0 to t = 1 and joins the loops that they touch.
-    void run() {
-        for (int s = 0; s < 4; ++s) arc_[s] = entry_.loop_of_edge[bottom_edge[s]];
-        std::array<std::pair<double, int>, 4> events;
-        int count = 0;
-        for (int k = 0; k < 4; ++k) {
-            const double low = d_[column[k]], high = d_[column[k] + 4];
-            if ((low >= 0) != (high >= 0)) events[count++] = {low / (low - high), k};
+struct Tables : PatternTable {
+    Tables() {
+        for (int c = 0; c < 256; ++c) {
+            int ambiguous = 0;
+            for (int f = 0; f < faces; ++f) ambiguous |= is_ambiguous(c, f) << f;
+            for (int joined = 0; joined < 1 << faces; ++joined) {
+                PatternId& id = of_key[c | joined << corners];
+                // The number with fewer bits came before.
+                id = joined & ~ambiguous ? of_key[c | (joined & ambiguous) << corners] : add_case(c, joined);
+            }
         }
-        for (int n = 1; n < count; ++n)  // at most four: an insertion sort
-            for (int k = n; k > 0 && events[k] < events[k - 1]; --k) std::swap(events[k], events[k - 1]);
-        double t = 0;
-        for (int n = 0; n < count; ++n) {
-            pass_saddles(t, events[n].first);
-            cross_column(events[n].second);
-            t = events[n].first;
-        }
-        pass_saddles(t, 1);
-        for (int s = 0; s < 4; ++s)
-            if (arc_[s] >= 0) join(arc_[s], entry_.loop_of_edge[bottom_edge[s] + top_offset[s]]);
     }
 
-    int group(int loop) const { return group_[loop]; }
-
- private:
-    // The slice's corners in cyclic order, the cell corners at their lower ends, and its sides between them.
-    static constexpr int column[4] = {0, 1, 3, 2};
-    static constexpr int bottom_edge[4] = {0, 5, 1, 4};  // x at y=0, y at x=1, x at y=1, y at x=0
-    static constexpr int top_offset[4] = {2, 2, 2, 2};   // the same edges at z=1
-
-    void join(int a, int b) {
-        if (a < 0 || b < 0) return;
-        const int from = group_[a], to = group_[b];
-        for (int& g : group_)
-            if (g == from) g = to;
+    PatternId add_pattern(const std::vector<Loop>& loops, int tunnel_a, int tunnel_b) {
+        patterns.push_back(make_pattern(loops, tunnel_a, tunnel_b));
+        tunnels.push_back({no_pattern, no_pattern});
+        return static_cast<PatternId>(patterns.size() - 1);
     }
 
-    /// Inside minus outside diagonal product of the slice at t: its saddle lies inside where this is ≥ 0.
-    double decider(double t) const {
-        double v[4];
-        for (int k = 0; k < 4; ++k) v[k] = d_[column[k]] + t * (d_[column[k] + 4] - d_[column[k]]);
-        return v[0] * v[2] - v[1] * v[3];
+    PatternId add_case(int sign_case, int joined) {
+        const std::vector<Loop> loops = trace_loops(sign_case, joined);
+        std::array<int, edges> loop_of_edge;
+        loop_of_edge.fill(-1);
+        for (std::size_t k = 0; k < loops.size(); ++k)
+            for (const int e : loops[k]) loop_of_edge[e] = static_cast<int>(k);
+        const PatternId id = add_pattern(loops, -1, -1);
+        bool settled = true;
+        for (int diagonal = 0; diagonal < 2; ++diagonal)
+            if (const auto pair = loops_of_slice(sign_case, diagonal, loop_of_edge)) {
+                const PatternId tunnel = add_pattern(loops, pair->first, pair->second);
+                tunnels[id][diagonal] = tunnel;
+                settled = false;
+            }
+        return settled ? id : static_cast<PatternId>(id | unsettled);
     }
-
-    /// While all four sides are crossed two arcs run through the slice; where its saddle changes sign they
-    /// meet.
-    void pass_saddles(double from, double to) {
-        for (const int a : arc_)
-            if (a < 0) return;
-        const double q0 = decider(0), q1 = decider(1), half = decider(0.5);
-        const double curve = 2 * (q0 + q1 - 2 * half),
-                     slope = q1 - q0 - curve;  // q(t) = q0 + slope t + curve t²
-        const double begin = from == 0 ? q0 : decider(from), end = to == 1 ? q1 : decider(to);
-        bool meet = (begin >= 0) != (end >= 0);
-        if (!meet && curve != 0) {
-            const double extreme = -slope / (2 * curve);
-            meet = extreme > from && extreme < to && (decider(extreme) >= 0) != (begin >= 0);
-        }
-        if (!meet) return;
-        for (int s = 1; s < 4; ++s) join(arc_[0], arc_[s]);
-    }
-
-    /// Corner k of the slice changes sign: an arc about it is born, dies, or moves to the other side.
-    void cross_column(int k) {
-        int& before = arc_[(k + 3) % 4];
-        int& after = arc_[k];
-        const int loop = entry_.loop_of_edge[8 + (column[k] & 3)];
-        join(before, loop);
-        join(after, loop);
-        const bool was_before = before >= 0, was_after = after >= 0;
-        before = was_before ? -1 : loop;
-        after = was_after ? -1 : loop;
-    }
-
-    const Entry& entry_;
-    const std::array<double, corners>& d_;
-    std::array<int, 4> group_;
-    std::array<int, 4> arc_{};  // a loop that the arc end on this side belongs to, -1 where there is none
 };
 
 }  // namespace
 
-const std::array<const Pattern*, 256>& fixed_patterns() {
-    static const auto instance = [] {
-        const Tables& t = tables();
-        std::array<const Pattern*, 256> patterns{};
-        for (int c = 0; c < 256; ++c) {
-            const Entry& entry = t.entries[t.first[c]];
-            if (t.ambiguous_count[c] == 0 && entry.loop_count <= 1) patterns[c] = &entry.separate;
-        }
-        return patterns;
-    }();
-    return instance;
-}
-
-const Pattern& pattern(int sign_case, const std::array<double, corners>& d) {
-    const Tables& t = tables();
-    int bits = 0;
-    for (int k = 0; k < t.ambiguous_count[sign_case]; ++k) {
-        const auto& q = face_corners[t.ambiguous[sign_case][k]];
-        const double even = d[q[0]] * d[q[2]], odd = d[q[1]] * d[q[3]];
-        const bool joined = inside(sign_case, q[0]) ? even >= odd : odd >= even;
-        bits |= joined << k;
-    }
-    const Entry& entry = t.entries[t.first[sign_case] + bits];
-    if (entry.loop_count < 2) return entry.separate;
-    Sweep sweep(entry, d);
-    sweep.run();
-    for (int a = 0; a < entry.loop_count; ++a)
-        for (int b = a + 1; b < entry.loop_count; ++b)
-            if (sweep.group(a) == sweep.group(b)) return t.tunnels[entry.tunnel[a][b]];
-    return entry.separate;
+const PatternTable& pattern_table() {
+    static const Tables tables;
+    return tables;
 }
 
 }  // namespace vdbgeo::cell

@@ -1,6 +1,6 @@
 #include "vdbgeo/surface/crossing_blocks.h"
 
-#include <emmintrin.h>
+#include <xmmintrin.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/surface/cell_kernels.h"
 
 namespace vdbgeo {
 namespace {
@@ -21,26 +22,15 @@ Coord offset(const Coord& c, int side, int step) {
     return c.offsetBy(side & 1 ? step : 0, side & 2 ? step : 0, side & 4 ? step : 0);
 }
 
-/// Bit z: v[z] ≥ isovalue, for eight values.
-unsigned sign_bits(const float* v, float isovalue) {
-    const __m128 iso = _mm_set1_ps(isovalue);
-    const int low = _mm_movemask_ps(_mm_cmpge_ps(_mm_loadu_ps(v), iso));
-    const int high = _mm_movemask_ps(_mm_cmpge_ps(_mm_loadu_ps(v + 4), iso));
-    return static_cast<unsigned>(low | high << 4);
-}
+constexpr LeafSigns all_below{}, all_above{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
 
-/// 1: a value lies below, 2: a value lies at or above, 3: both.
-std::uint8_t leaf_state(const float* v, float isovalue) {
-    const __m128 iso = _mm_set1_ps(isovalue);
-    __m128 all = _mm_castsi128_ps(_mm_set1_epi32(-1)), any = _mm_setzero_ps();
-    for (int i = 0; i < leaf::size; i += 8) {
-        const __m128 a = _mm_cmpge_ps(_mm_loadu_ps(v + i), iso),
-                     b = _mm_cmpge_ps(_mm_loadu_ps(v + i + 4), iso);
-        all = _mm_and_ps(all, _mm_and_ps(a, b));
-        any = _mm_or_ps(any, _mm_or_ps(a, b));
-    }
-    const bool below = _mm_movemask_ps(all) != 0xF, above = _mm_movemask_ps(any) != 0;
-    return static_cast<std::uint8_t>((below ? 1 : 0) | (above ? 2 : 0));
+constexpr std::uint64_t last_of_rows = 0x8080808080808080ull,
+                        first_of_rows = 0x0101010101010101ull;
+
+/// The word of the samples one step further along y, or z, where `next` is the upper neighbour's.
+std::uint64_t step_y(std::uint64_t word, std::uint64_t next) { return word >> 8 | next << 56; }
+std::uint64_t step_z(std::uint64_t word, std::uint64_t next) {
+    return (word >> 1 & ~last_of_rows) | (next & first_of_rows) << 7;
 }
 
 }  // namespace
@@ -128,7 +118,8 @@ void CrossingBlocks::classify(Node& node) const {
     }
     node.block.assign(node_blocks, -1);
     node.samples.assign(node_blocks, nullptr);
-    const auto* lower = tree_.probeConstNode<LowerNode>(node.origin);
+    node.signs_at.resize(node_blocks);
+    const auto* lower = node.lower = tree_.probeConstNode<LowerNode>(node.origin);
     if (!lower) {
         node.state.assign(node_blocks, sign_state(tree_.getValue(node.origin)));
         return;
@@ -136,13 +127,22 @@ void CrossingBlocks::classify(Node& node) const {
     node.state.resize(node_blocks);
     static_assert(LowerNode::NUM_VALUES == node_blocks, "the node's table has the block order of VDB's");
     for (auto it = lower->cbeginValueAll(); it; ++it) node.state[it.pos()] = sign_state(*it);
+    const cell::Kernels& kernels = cell::kernels();
     // Two loops: the first finds the buffers without waiting for what lies in them.
     for (auto it = lower->cbeginChildOn(); it; ++it) node.samples[it.pos()] = it->buffer().data();
     for (std::size_t i = 0; i < node_blocks; ++i) {
         constexpr std::size_t ahead = 2;
         if (i + ahead < node_blocks && node.samples[i + ahead])
             for (int k = 0; k < leaf::size; k += 16) _mm_prefetch(node.samples[i + ahead] + k, _MM_HINT_T0);
-        if (node.samples[i]) node.state[i] = leaf_state(node.samples[i], isovalue_);
+        if (!node.samples[i]) continue;
+        LeafSigns signs;
+        kernels.sign_words(node.samples[i], isovalue_, signs.word);
+        std::uint64_t any = 0, all = ~0ull;
+        for (const std::uint64_t word : signs.word) any |= word, all &= word;
+        node.state[i] = any == 0 ? below : ~all == 0 ? above : mixed;
+        if (node.state[i] != mixed) continue;
+        node.signs_at[i] = static_cast<std::int32_t>(node.signs.size());
+        node.signs.push_back(signs);
     }
 }
 
@@ -191,37 +191,71 @@ std::int64_t CrossingBlocks::neighbour(std::size_t b, int side) const {
                       : nodes_[static_cast<std::size_t>(p.node)].block[static_cast<std::size_t>(p.block)];
 }
 
+/// The signs of the block (side 0) or of an upper neighbour.
+const LeafSigns& CrossingBlocks::signs(const Block& block, int side) const {
+    const Place p = step(block, side);
+    std::uint8_t state = 0;
+    if (p.node < 0) {
+        const Node& node = nodes_[static_cast<std::size_t>(block.node)];
+        state = node.upper_state[static_cast<std::size_t>(p.side)];
+    } else {
+        const Node& node = nodes_[static_cast<std::size_t>(p.node)];
+        const auto at = static_cast<std::size_t>(p.block);
+        state = node.state[at];
+        if (state == mixed) return node.signs[static_cast<std::size_t>(node.signs_at[at])];
+    }
+    return state == above ? all_above : all_below;
+}
+
+void CrossingBlocks::load_signs(std::size_t b, CornerSigns& out) const {
+    const Block& block = blocks_[b];
+    const LeafSigns* of[8];
+    for (int side = 0; side < 8; ++side) of[side] = &signs(block, side);
+    for (int x = 0; x <= leaf::dim; ++x) {
+        const LeafSigns* const* from = of + (x >> 3);
+        const int i = x & 7;
+        const std::uint64_t here = from[0]->word[i], y = from[2]->word[i];
+        out.here[x] = here;
+        out.y[x] = step_y(here, y);
+        out.z[x] = step_z(here, from[4]->word[i]);
+        out.yz[x] = step_y(out.z[x], step_z(y, from[6]->word[i]));
+    }
+}
+
+/// The value of a block, or an upper neighbour, that is no leaf.
+float CrossingBlocks::constant_value(const Block& block, int side) const {
+    const Coord c = offset(block.origin, side, leaf::dim);
+    const Place p = step(block, side);
+    if (p.node < 0) return tree_.getValue(c);
+    const LowerNode* lower = nodes_[static_cast<std::size_t>(p.node)].lower;
+    return lower ? lower->getValue(c) : tree_.getValue(c);
+}
+
 /// The part of the samples that comes from the block itself (side 0) or an upper neighbour.
 void CrossingBlocks::load_rows(const Block& block, int side, BlockSamples& out) const {
     const Place p = step(block, side);
     const float* in =
         p.node < 0 ? nullptr
                    : nodes_[static_cast<std::size_t>(p.node)].samples[static_cast<std::size_t>(p.block)];
-    const float constant = in ? 0 : tree_.getValue(offset(block.origin, side, leaf::dim));
+    float constant[leaf::dim];
+    if (!in) std::fill_n(constant, leaf::dim, constant_value(block, side));
     const int nx = side & 1 ? 1 : leaf::dim, ny = side & 2 ? 1 : leaf::dim;
     const int x0 = side & 1 ? leaf::dim : 0, y0 = side & 2 ? leaf::dim : 0;
     for (int x = 0; x < nx; ++x)
         for (int y = 0; y < ny; ++y) {
             float* row = out.values[x0 + x][y0 + y];
-            std::uint16_t& bits =
-                out.inside[static_cast<std::size_t>(x0 + x)][static_cast<std::size_t>(y0 + y)];
-            if (side & 4) {
-                const float last = in ? in[leaf::offset(x, y, 0)] : constant;
-                row[leaf::dim] = last;
-                bits = static_cast<std::uint16_t>(bits | (last >= isovalue_ ? 0x100 : 0));
-            } else {
-                if (in)
-                    std::memcpy(row, in + leaf::offset(x, y, 0), leaf::dim * sizeof(float));
-                else
-                    std::fill_n(row, leaf::dim, constant);
-                bits = static_cast<std::uint16_t>(sign_bits(row, isovalue_));
-            }
+            const float* from = in ? in + leaf::offset(x, y, 0) : constant;
+            if (side & 4)
+                row[leaf::dim] = *from;
+            else
+                std::memcpy(row, from, leaf::dim * sizeof(float));
         }
 }
 
-/// Sets the samples that load will want on their way from memory: they lie scattered over eight leaves.
+/// Sets the samples that load will want on their way from memory: they lie scattered over eight leaves. Those
+/// above along z are mostly the next block's own.
 void CrossingBlocks::prefetch(std::size_t b) const {
-    for (int side = 0; side < 8; ++side) {
+    for (int side = 0; side < 4; ++side) {
         const Place p = step(blocks_[b], side);
         if (p.node < 0) continue;
         const float* in = nodes_[static_cast<std::size_t>(p.node)].samples[static_cast<std::size_t>(p.block)];
@@ -235,8 +269,7 @@ void CrossingBlocks::prefetch(std::size_t b) const {
 
 void CrossingBlocks::load(std::size_t b, BlockSamples& out) const {
     if (b + 1 < blocks_.size()) prefetch(b + 1);
-    for (int side = 0; side < 8; ++side)
-        load_rows(blocks_[b], side, out);  // the z neighbours (4…7) come last
+    for (int side = 0; side < 8; ++side) load_rows(blocks_[b], side, out);
 }
 
 }  // namespace vdbgeo

@@ -13,13 +13,22 @@
 
 namespace vdbgeo {
 
+/// Which samples of a leaf are at or above the isovalue: bit 8·y + z of word x.
+struct LeafSigns {
+    std::uint64_t word[leaf::dim];
+};
+
+/// The signs at the corners of a block's cells: bit 8·y + z of word x is the sample at (x, y, z) in `here`, at
+/// (x, y+1, z) in `y`, at (x, y, z+1) in `z` and at (x, y+1, z+1) in `yz`.
+struct CornerSigns {
+    std::uint64_t here[leaf::dim + 1], y[leaf::dim + 1], z[leaf::dim + 1], yz[leaf::dim + 1];
+};
+
 /// The samples of one block and of the first layer of its upper neighbours, 9³ in all: what its cells need.
 struct BlockSamples {
     static constexpr int dim = leaf::dim + 1;
     /// Row (x, y) begins at values[x][y]; 9 of the 12 floats are samples in z order.
     alignas(16) float values[dim][dim][12];
-    /// Bit z of inside[x][y]: the sample is at or above the isovalue.
-    std::array<std::array<std::uint16_t, dim>, dim> inside;
 };
 
 /// The blocks of a grid whose cells, or whose edges, may cross the isovalue: those where a sample of the
@@ -41,7 +50,8 @@ class CrossingBlocks {
     /// Block b (bit pattern 0) and its upper neighbours: bit a of `side` steps along axis a. -1 where the
     /// neighbour is not crossed.
     std::int64_t neighbour(std::size_t b, int side) const;
-    /// Samples of block b and their signs.
+    /// The signs of block b's samples and of its upper neighbours' first layers.
+    void load_signs(std::size_t b, CornerSigns& out) const;
     void load(std::size_t b, BlockSamples& out) const;
 
  private:
@@ -55,6 +65,9 @@ class CrossingBlocks {
         std::array<std::uint8_t, 8> upper_state{};  // of those that are outside all nodes
         std::vector<std::uint8_t> state;            // per block
         std::vector<const float*> samples;          // per block, its leaf's values, null for a tile
+        std::vector<std::int32_t> signs_at;         // per block that is mixed, its place in `signs`
+        std::vector<LeafSigns> signs;               // of the blocks that are mixed
+        const leaf::LowerNode* lower = nullptr;     // null where the node is a tile
         std::vector<std::int32_t> block;            // per block, its number or -1
     };
     struct Block {
@@ -76,6 +89,8 @@ class CrossingBlocks {
     void collect_nodes();
     void classify(Node& node) const;
     void find_blocks(std::size_t n, std::vector<Block>& out) const;
+    const LeafSigns& signs(const Block& block, int side) const;
+    float constant_value(const Block& block, int side) const;
     void prefetch(std::size_t b) const;
     void load_rows(const Block& block, int side, BlockSamples& out) const;
 

@@ -1,12 +1,16 @@
 #include "vdbgeo/surface/marching_cubes.h"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/surface/block_cells.h"
+#include "vdbgeo/surface/cell_kernels.h"
 #include "vdbgeo/surface/cell_topology.h"
 #include "vdbgeo/surface/crossing_blocks.h"
 
@@ -18,92 +22,59 @@ using openvdb::Coord;
 
 constexpr int dim = leaf::dim;
 
-/// Set bits of a byte: the baseline instruction set has no instruction for it.
-struct BitCounts {
-    std::array<std::uint8_t, 256> of{};
-    constexpr BitCounts() {
-        for (int i = 1; i < 256; ++i)
-            of[static_cast<std::size_t>(i)] =
-                static_cast<std::uint8_t>((i & 1) + of[static_cast<std::size_t>(i / 2)]);
-    }
-};
-constexpr BitCounts bit_counts;
-constexpr unsigned count_bits(unsigned byte) { return bit_counts.of[byte & 0xFF]; }
-
-/// The crossed grid edges whose lower end lies in one block, in the order of their vertices: by row (x, y),
-/// then axis, then z. Filled by the thread that counts the block.
-struct BlockEdges {
-    std::array<std::array<std::uint8_t, 3>, leaf::rows> crossed;  // bit z of [row][axis]
-    std::array<std::uint16_t, leaf::rows> row_first;  // number of the row's first vertex in the block
-    std::uint16_t edge_vertices, extra_vertices;
-    std::uint32_t triangles;
-    std::uint64_t first_vertex, first_triangle;
-};
-
-/// The vertex numbers on all crossed edges that a block's cells touch, its own and its upper neighbours'.
-class VertexNumbers {
+/// The pattern table in the form that the kernels draw from.
+class DrawingTable {
  public:
-    /// Of the cell at (x, y, z): the vertex on its edge e is at [edge_place[e]].
-    const VertexId* cell(int x, int y, int z) const { return number_.data() + place(x, y, z, 0); }
-
-    static constexpr int place(int x, int y, int z, int axis) {
-        return ((x * BlockSamples::dim + y) * 3 + axis) * BlockSamples::dim + z;
-    }
-
-    /// Takes the edges of the block (side 0) or of an upper neighbour that lie in the block's cells.
-    void take(const BlockEdges& edges, int side) {
-        const int x0 = side & 1 ? dim : 0, y0 = side & 2 ? dim : 0;
-        const int nx = side & 1 ? 1 : dim, ny = side & 2 ? 1 : dim;
-        for (int x = 0; x < nx; ++x)
-            for (int y = 0; y < ny; ++y) {
-                const auto row = static_cast<std::size_t>(leaf::row(x, y));
-                auto next = static_cast<VertexId>(edges.first_vertex + edges.row_first[row]);
-                for (int a = 0; a < 3; ++a) {
-                    const unsigned crossed = edges.crossed[row][static_cast<std::size_t>(a)];
-                    VertexId* out = number_.data() + place(x0 + x, y0 + y, 0, a);
-                    if (side & 4) {
-                        if (crossed & 1) out[dim] = next;
-                        next += count_bits(crossed);
-                    } else {
-                        for (unsigned left = crossed; left; left &= left - 1)
-                            out[__builtin_ctz(left)] = next++;
-                    }
-                }
-            }
-    }
-
- private:
-    std::array<VertexId, 3 * BlockSamples::dim * BlockSamples::dim * BlockSamples::dim> number_{};
-};
-
-constexpr std::array<int, cell::edges> make_edge_places() {
-    std::array<int, cell::edges> places{};
-    for (int e = 0; e < cell::edges; ++e) {
-        const int c = cell::lower_corner(e);
-        places[static_cast<std::size_t>(e)] = VertexNumbers::place(c & 1, c >> 1 & 1, c >> 2 & 1, e / 4);
-    }
-    return places;
-}
-constexpr std::array<int, cell::edges> edge_place = make_edge_places();
-
-/// Calls visit(x, y, z, sign case) for the block's cells that the surface crosses, in a fixed order.
-template <class Visit>
-void for_each_crossed_cell(const BlockSamples& s, const Vec3i& cells, const Visit& visit) {
-    const unsigned in_box = (1u << cells.z()) - 1;
-    for (std::size_t x = 0; x < static_cast<std::size_t>(cells.x()); ++x)
-        for (std::size_t y = 0; y < static_cast<std::size_t>(cells.y()); ++y) {
-            const unsigned a = s.inside[x][y], b = s.inside[x + 1][y], c = s.inside[x][y + 1],
-                           d = s.inside[x + 1][y + 1];
-            const unsigned any = a | b | c | d, all = a & b & c & d;
-            for (unsigned left = (any | any >> 1) & ~(all & all >> 1) & in_box; left; left &= left - 1) {
-                const int z = __builtin_ctz(left);
-                const auto bits = [z](unsigned row) { return row >> z & 1; };
-                const unsigned sign_case = bits(a) | bits(b) << 1 | bits(c) << 2 | bits(d) << 3 |
-                                           bits(a >> 1) << 4 | bits(b >> 1) << 5 | bits(c >> 1) << 6 |
-                                           bits(d >> 1) << 7;
-                visit(static_cast<int>(x), static_cast<int>(y), z, static_cast<int>(sign_case));
+    explicit DrawingTable(bool mirrored) {
+        const std::vector<Pattern>& patterns = cell::pattern_table().patterns;
+        first_.resize(patterns.size());
+        more_.resize(patterns.size());
+        for (std::size_t p = 0; p < patterns.size(); ++p) {
+            const Pattern& pattern = patterns[p];
+            const int count = 3 * pattern.triangle_count;
+            const bool special = pattern.centre_count > 0 || count > 32;
+            corners_.push_back(static_cast<std::uint8_t>(special ? count + cell::Drawing::special : count));
+            sizes_.push_back(pattern.triangle_count | static_cast<std::uint32_t>(pattern.centre_count) << 16);
+            if (special) continue;
+            for (int i = 0; i < count; ++i) {
+                const int v = mirrored ? 2 - i % 3 : i % 3;
+                const int place = place_of(pattern.triangles[static_cast<std::size_t>(i / 3)]
+                                                            [static_cast<std::size_t>(v)]);
+                (i < 16 ? first_ : more_)[p].place[i & 15] = static_cast<std::uint8_t>(place);
             }
         }
+    }
+
+    /// Where the number of a pattern's vertex stands: those inside the cell take the free places.
+    static int place_of(int vertex) {
+        if (vertex >= cell::edges) return cell::number_place(3, vertex - cell::edges);
+        return cell::number_place(vertex / 4, cell::lower_corner(vertex));
+    }
+
+    cell::Drawing drawing() const { return {first_.data(), more_.data(), corners_.data()}; }
+    /// Triangles of a pattern | vertices inside the cell << 16.
+    std::uint32_t size(cell::PatternId p) const { return sizes_[p]; }
+
+ private:
+    std::vector<cell::Drawing::Places> first_, more_;
+    std::vector<std::uint8_t> corners_;
+    std::vector<std::uint32_t> sizes_;
+};
+
+const DrawingTable& drawing_table(bool mirrored) {
+    static const DrawingTable direct(false), reversed(true);
+    return mirrored ? reversed : direct;
+}
+
+/// Has the pages of an array that is about to be written put there by one call, which costs less than a fault
+/// for each. Nothing depends on it.
+void fault_in(const void* begin, const void* end) {
+#ifdef MADV_POPULATE_WRITE
+    static const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    const auto first = reinterpret_cast<std::uintptr_t>(begin) & ~(page - 1),
+               last = reinterpret_cast<std::uintptr_t>(end) & ~(page - 1);
+    if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_POPULATE_WRITE);
+#endif
 }
 
 /// The extraction of one map, in two passes over the crossed blocks: count, then fill.
@@ -112,21 +83,20 @@ class Extraction {
     Extraction(const DensityMap& map, float isovalue, const Progress& progress)
         : frame_(map.frame),
           mirrored_(map.frame.axes.determinant() < 0),
+          diagonal_(frame_.axes.isDiagonal(0)),
           isovalue_(isovalue),
           progress_(progress),
           blocks_(map.grid->constTree(), map.frame, isovalue, progress.part(0, 0.2)),
-          hard_cells_((blocks_.size() + chunk - 1) / chunk) {}
+          table_(drawing_table(mirrored_)),
+          patterns_((blocks_.size() + chunk - 1) / chunk) {}
 
     TriMesh run() {
-        edges_.resize(blocks_.size());
-        for_each_chunk(0.2, 0.5, [this](std::size_t b, Workspace& work) { count(b, work.samples); });
+        cells_.resize(blocks_.size());
+        for_each_chunk(0.2, 0.5, [this](std::size_t begin, std::size_t end) { count(begin, end); });
         const auto [vertices, triangles] = number();
         mesh_.points.resize(vertices);
         mesh_.triangles.resize(triangles);
-        for_each_chunk(0.5, 1.0, [this](std::size_t b, Workspace& work) {
-            place_vertices(b, work.samples);
-            make_triangles(b, work);
-        });
+        for_each_chunk(0.5, 1.0, [this](std::size_t begin, std::size_t end) { fill(begin, end); });
         return std::move(mesh_);
     }
 
@@ -134,23 +104,12 @@ class Extraction {
     static constexpr std::size_t chunk = 32;  // blocks a task
     static constexpr double nearest = 1.0 / 1024;
 
-    /// What a task keeps from block to block.
-    struct Workspace {
-        BlockSamples samples;
-        VertexNumbers numbers;
-        std::size_t hard = 0;  // hard cells of the chunk so far
-    };
-
     template <class Body>
     void for_each_chunk(double from, double to, const Body& body) {
         const Progress progress = progress_.part(from, to);
         std::atomic<std::size_t> done{0};
         parallel_blocks(blocks_.size(), chunk, [&](std::size_t begin, std::size_t end) {
-            Workspace work;
-            for (std::size_t b = begin; b < end; ++b) {
-                blocks_.load(b, work.samples);
-                body(b, work);
-            }
+            body(begin, end);
             const std::size_t now = done += end - begin;
             if ((now / chunk) % 64 == 0)
                 progress.report(static_cast<double>(now) / static_cast<double>(blocks_.size()));
@@ -168,66 +127,111 @@ class Extraction {
         return n;
     }
 
-    static Vec3i cells_in_box(const Vec3i& samples) { return samples - Vec3i::Ones(); }
-
-    static std::array<double, 8> cell_values(const BlockSamples& s, int x, int y, int z, double isovalue) {
-        std::array<double, 8> d;
-        for (int c = 0; c < 8; ++c)
-            d[static_cast<std::size_t>(c)] =
-                s.values[x + (c & 1)][y + (c >> 1 & 1)][z + (c >> 2 & 1)] - isovalue;
-        return d;
+    void count(std::size_t begin, std::size_t end) {
+        BlockSamples samples;
+        std::array<cell::PatternId, chunk * cell::block_cells> patterns;
+        cell::PatternId* next = patterns.data();
+        for (std::size_t b = begin; b < end; ++b) next = count_block(b, samples, next);
+        patterns_[begin / chunk].assign(patterns.data(), next);
     }
 
-    void count(std::size_t b, const BlockSamples& s) {
-        BlockEdges& edges = edges_[b];
-        const Vec3i n = samples_in_box(b);
-        const unsigned samples = (1u << std::min(n.z(), dim)) - 1, steps = (1u << (n.z() - 1)) - 1;
-        unsigned vertices = 0;
-        for (int x = 0; x < dim; ++x)
-            for (int y = 0; y < dim; ++y) {
-                const auto row = static_cast<std::size_t>(leaf::row(x, y));
-                edges.row_first[row] = static_cast<std::uint16_t>(vertices);
-                edges.crossed[row] = {};
-                if (x >= n.x() || y >= n.y()) continue;
-                const auto at = [&](int i, int j) -> unsigned {
-                    return s.inside[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-                };
-                const unsigned here = at(x, y);
-                const unsigned along[3] = {x + 1 < n.x() ? (here ^ at(x + 1, y)) & samples : 0,
-                                           y + 1 < n.y() ? (here ^ at(x, y + 1)) & samples : 0,
-                                           (here ^ here >> 1) & steps};
-                for (std::size_t a = 0; a < 3; ++a) {
-                    edges.crossed[row][a] = static_cast<std::uint8_t>(along[a]);
-                    vertices += count_bits(along[a]);
-                }
+    /// Writes the patterns of the block's active cells and returns the end of them.
+    cell::PatternId* count_block(std::size_t b, BlockSamples& samples, cell::PatternId* patterns) {
+        BlockCells& out = cells_[b];
+        CornerSigns signs;
+        blocks_.load_signs(b, signs);
+        find_edges(signs, samples_in_box(b), out);
+        cell::FaceBits faces;
+        const bool ambiguous = find_ambiguous_faces(signs, out.active, faces);
+        if (ambiguous) {
+            blocks_.load(b, samples);
+            decide_faces(signs, samples, isovalue_, faces);
+        }
+        const std::uint64_t* const corners[8] = {signs.here, signs.here + 1, signs.y,  signs.y + 1,
+                                                 signs.z,    signs.z + 1,    signs.yz, signs.yz + 1};
+        std::array<cell::OpenCell, cell::block_cells> open;
+        const auto [count, open_count] =
+            kernels_.list_patterns(out.active, corners, ambiguous ? &faces : nullptr,
+                                   cell::pattern_table().of_key.data(), patterns, open.data());
+        if (open_count > 0) {
+            if (!ambiguous) blocks_.load(b, samples);
+            settle(open.data(), open_count, samples, patterns);
+        }
+        std::uint32_t sizes = 0;
+        for (int i = 0; i < count; ++i) sizes += table_.size(patterns[i]);
+        out.triangles = sizes & 0xFFFF;
+        out.extra_vertices = static_cast<std::uint16_t>(sizes >> 16);
+        out.cells = static_cast<std::uint16_t>(count);
+        return patterns + count;
+    }
+
+    /// Finds which of the cells have tunnels.
+    void settle(const cell::OpenCell* open, int count, const BlockSamples& samples,
+                cell::PatternId* patterns) const {
+        std::array<cell::SliceTest, 2 * cell::block_cells + cell::tests_at_once> tests;
+        const auto tunnels = [&](const cell::OpenCell& c) -> const cell::TunnelPatterns& {
+            return cell::pattern_table().tunnels[patterns[c.item] & ~cell::unsettled];
+        };
+        std::size_t n = 0;
+        for (int i = 0; i < count; ++i)
+            for (std::uint8_t diagonal = 0; diagonal < 2; ++diagonal) {
+                tests[n] = {open[i], diagonal, false};
+                n += tunnels(open[i])[diagonal] != cell::no_pattern;
             }
-        edges.edge_vertices = static_cast<std::uint16_t>(vertices);
-        unsigned triangles = 0, extra = 0;
-        for_each_crossed_cell(s, cells_in_box(n), [&](int x, int y, int z, int sign_case) {
-            const Pattern* p = fixed_[static_cast<std::size_t>(sign_case)];
-            if (!p) {
-                p = &cell::pattern(sign_case, cell_values(s, x, y, z, isovalue_));
-                hard_cells_[b / chunk].push_back(p);
-            }
-            triangles += p->triangle_count;
-            extra += p->centre_count;
-        });
-        edges.triangles = triangles;
-        edges.extra_vertices = static_cast<std::uint16_t>(extra);
+        std::size_t full = n;
+        while (full % cell::tests_at_once) tests[full++] = tests[n - 1];
+        kernels_.settle(samples.values[0][0], static_cast<float>(isovalue_), tests.data(),
+                        static_cast<int>(full));
+        for (std::size_t i = 0; i < n; ++i) {
+            cell::PatternId& pattern = patterns[tests[i].open.item];
+            if (tests[i].change && (pattern & cell::unsettled)) pattern = tunnels(tests[i].open)[tests[i].diagonal];
+        }
+        for (int i = 0; i < count; ++i) patterns[open[i].item] &= static_cast<cell::PatternId>(~cell::unsettled);
     }
 
     std::pair<std::uint64_t, std::uint64_t> number() {
         std::uint64_t vertices = 0, triangles = 0;
-        for (BlockEdges& e : edges_) {
-            e.first_vertex = vertices;
-            e.first_triangle = triangles;
-            vertices += e.edge_vertices + e.extra_vertices;
-            triangles += e.triangles;
+        for (BlockCells& c : cells_) {
+            c.first_vertex = vertices;
+            c.first_triangle = triangles;
+            vertices += c.edge_vertices + c.extra_vertices;
+            triangles += c.triangles;
         }
         if (vertices > TriMesh::max_vertices)
             throw InvalidInput(fmt::format(
                 "the surface has {} vertices, more than 2^32-1: noise, or work for blocks", vertices));
         return {vertices, triangles};
+    }
+
+    /// What a task fills the mesh with, block after block.
+    struct Filling {
+        Extraction* extraction;
+        BlockSamples samples;
+        cell::VertexNumbers numbers;
+        std::size_t block = 0;
+        std::uint64_t extra = 0;           // the next vertex inside a cell
+        const float* end_of_points;        // of the task: what follows is another's
+        std::uint32_t* end_of_triangles;
+    };
+
+    void fill(std::size_t begin, std::size_t end) {
+        Filling filling;
+        filling.extraction = this;
+        const bool last = end == cells_.size();
+        filling.end_of_points =
+            mesh_.points.data()->data() + 3 * (last ? mesh_.points.size() : cells_[end].first_vertex);
+        filling.end_of_triangles =
+            mesh_.triangles.data()->data() + 3 * (last ? mesh_.triangles.size() : cells_[end].first_triangle);
+        fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
+        fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
+        const cell::PatternId* patterns = patterns_[begin / chunk].data();
+        for (std::size_t b = begin; b < end; ++b) {
+            filling.block = b;
+            blocks_.load(b, filling.samples);
+            place_vertices(filling);
+            make_triangles(filling, patterns);
+            patterns += cells_[b].cells;
+        }
     }
 
     Vec3f world(const Coord& origin, const Vec3d& place) const {
@@ -245,21 +249,32 @@ class Extraction {
         return std::min(1 - nearest, std::max(nearest, t));
     }
 
-    void place_vertices(std::size_t b, const BlockSamples& s) {
-        const BlockEdges& edges = edges_[b];
-        const Coord origin = blocks_.origin(b);
-        Vec3f* out = mesh_.points.data() + edges.first_vertex;
+    void place_vertices(Filling& filling) {
+        const BlockCells& cells = cells_[filling.block];
+        const Coord origin = blocks_.origin(filling.block);
+        Vec3f* out = mesh_.points.data() + cells.first_vertex;
+        if (diagonal_) {
+            cell::DiagonalPlacing placing;
+            for (int a = 0; a < 3; ++a) {
+                placing.origin[a] = frame_.origin[a];
+                placing.step[a] = frame_.axes(a, a);
+                placing.index[a] = origin[a];
+            }
+            placing.isovalue = isovalue_;
+            placing.nearest = nearest;
+            placing.end = filling.end_of_points;
+            kernels_.place_vertices(filling.samples.values[0][0], cells.edges, placing, out->data());
+            return;
+        }
+        const BlockSamples& s = filling.samples;
         for (int x = 0; x < dim; ++x)
-            for (int y = 0; y < dim; ++y)
+            for (int i = 0; i < dim * dim; ++i)
                 for (int a = 0; a < 3; ++a) {
-                    const auto row = static_cast<std::size_t>(leaf::row(x, y));
-                    for (unsigned left = edges.crossed[row][static_cast<std::size_t>(a)]; left;
-                         left &= left - 1) {
-                        const int z = __builtin_ctz(left);
-                        const float from = s.values[x][y][z],
-                                    to = s.values[x + (a == 0)][y + (a == 1)][z + (a == 2)];
-                        *out++ = world(origin, on_edge(x, y, z, a, crossing(from, to)));
-                    }
+                    if (!(cells.edges.crossed[a][x] >> i & 1)) continue;
+                    const int y = i >> 3, z = i & 7;
+                    const float from = s.values[x][y][z],
+                                to = s.values[x + (a == 0)][y + (a == 1)][z + (a == 2)];
+                    *out++ = world(origin, on_edge(x, y, z, a, crossing(from, to)));
                 }
     }
 
@@ -269,47 +284,68 @@ class Extraction {
         return on_edge(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1), e / 4, crossing(value(c), value(d)));
     }
 
-    Vec3d mean_crossing(const BlockSamples& s, int x, int y, int z, unsigned edges) const {
-        Vec3d sum = Vec3d::Zero();
-        for (unsigned left = edges; left; left &= left - 1)
-            sum += crossing_on(s, x, y, z, __builtin_ctz(left));
-        return sum / __builtin_popcount(edges);
+    void make_triangles(Filling& filling, const cell::PatternId* patterns) {
+        for (int side = 0; side < 7; ++side) {  // no cell has an edge of the block above along all axes
+            const std::int64_t n = blocks_.neighbour(filling.block, side);
+            if (n < 0) continue;
+            const BlockCells& from = cells_[static_cast<std::size_t>(n)];
+            kernels_.take_numbers(from.edges, static_cast<std::uint32_t>(from.first_vertex), side,
+                                  filling.numbers);
+        }
+        const BlockCells& cells = cells_[filling.block];
+        filling.extra = cells.first_vertex + cells.edge_vertices;
+        kernels_.draw({cells.active, patterns, &filling.numbers, table_.drawing(),
+                       (mesh_.triangles.data() + cells.first_triangle)->data(), filling.end_of_triangles,
+                       [](void* context, int x, int y, int z, int pattern, std::uint32_t* numbers,
+                          std::uint32_t* out) {
+                           auto& f = *static_cast<Filling*>(context);
+                           f.extraction->draw_special(f, x, y, z, pattern, numbers, out);
+                       },
+                       &filling});
     }
 
-    void make_triangles(std::size_t b, Workspace& work) {
-        for (int side = 0; side < 8; ++side) {
-            const std::int64_t n = blocks_.neighbour(b, side);
-            if (n >= 0) work.numbers.take(edges_[static_cast<std::size_t>(n)], side);
+    /// A cell with vertices inside.
+    void draw_special(Filling& filling, int x, int y, int z, int pattern, VertexId* numbers, VertexId* out) {
+        const Pattern& p = cell::pattern_table().patterns[static_cast<std::size_t>(pattern)];
+        unsigned all = 0;
+        for (std::size_t k = 0; k < p.centre_count; ++k) all |= p.centre_edges[k] | p.around_edges[k];
+        std::array<Vec3d, cell::edges> crossings;
+        for (unsigned left = all; left; left &= left - 1) {
+            const int e = __builtin_ctz(left);
+            crossings[static_cast<std::size_t>(e)] = crossing_on(filling.samples, x, y, z, e);
         }
-        const BlockEdges& edges = edges_[b];
-        const BlockSamples& s = work.samples;
-        Triangle* out = mesh_.triangles.data() + edges.first_triangle;
-        std::uint64_t extra = edges.first_vertex + edges.edge_vertices;
-        std::array<VertexId, cell::edges + cell::max_centres> id;
-        for_each_crossed_cell(s, cells_in_box(samples_in_box(b)), [&](int x, int y, int z, int sign_case) {
-            const Pattern* fixed = fixed_[static_cast<std::size_t>(sign_case)];
-            const Pattern& p = fixed ? *fixed : *hard_cells_[b / chunk][work.hard++];
-            const VertexId* number = work.numbers.cell(x, y, z);
-            for (std::size_t e = 0; e < cell::edges; ++e) id[e] = number[edge_place[e]];
-            for (std::size_t k = 0; k < p.centre_count; ++k) {
-                const Vec3d place = 0.5 * (mean_crossing(s, x, y, z, p.centre_edges[k]) +
-                                           mean_crossing(s, x, y, z, p.around_edges[k]));
-                mesh_.points[extra] = world(blocks_.origin(b), place);
-                id[cell::edges + k] = static_cast<VertexId>(extra++);
-            }
-            for (std::size_t k = 0; k < p.triangle_count; ++k, ++out)
-                for (std::size_t v = 0; v < 3; ++v) (*out)[mirrored_ ? 2 - v : v] = id[p.triangles[k][v]];
-        });
+        const auto mean = [&](unsigned edges) -> Vec3d {
+            Vec3d sum = Vec3d::Zero();
+            int count = 0;
+            for (unsigned left = edges; left; left &= left - 1, ++count)
+                sum += crossings[static_cast<std::size_t>(__builtin_ctz(left))];
+            return sum / count;
+        };
+        unsigned around = 0;
+        Vec3d around_mean = Vec3d::Zero();
+        for (std::size_t k = 0; k < p.centre_count; ++k) {
+            if (around != p.around_edges[k]) around_mean = mean(around = p.around_edges[k]);
+            const Vec3d centre = p.centre_edges[k] == around ? around_mean : mean(p.centre_edges[k]);
+            mesh_.points[filling.extra] =
+                world(blocks_.origin(filling.block), 0.5 * (centre + around_mean));
+            numbers[DrawingTable::place_of(cell::edges + static_cast<int>(k))] =
+                static_cast<VertexId>(filling.extra++);
+        }
+        for (std::size_t k = 0; k < p.triangle_count; ++k)
+            for (std::size_t v = 0; v < 3; ++v)
+                *out++ = numbers[DrawingTable::place_of(p.triangles[k][mirrored_ ? 2 - v : v])];
     }
 
     const Frame frame_;
     const bool mirrored_;  // the frame turns triangles round
+    const bool diagonal_;  // the frame's axes are the world's
     const double isovalue_;
     const Progress progress_;
     const CrossingBlocks blocks_;
-    const std::array<const Pattern*, 256>& fixed_ = cell::fixed_patterns();
-    Array<BlockEdges> edges_;
-    std::vector<std::vector<const Pattern*>> hard_cells_;  // per chunk, in cell order
+    const DrawingTable& table_;
+    const cell::Kernels& kernels_ = cell::kernels();
+    Array<BlockCells> cells_;
+    std::vector<std::vector<cell::PatternId>> patterns_;  // of the active cells, per chunk
     TriMesh mesh_;
 };
 

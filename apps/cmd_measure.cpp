@@ -69,7 +69,6 @@ Command measure_command() {
     return {"measure", "Area, volume, components, genus, closedness and angles of a mesh",
             "  vdbgeo measure groel.ply --json", [](CLI::App& app) {
                 auto o = std::make_shared<MeasureOptions>();
-<<<<<<< HEAD
                 app.add_option("meshes", o->in, "Meshes: " + mesh_endings_text())->required();
                 app.add_option(
                     "--histogram", o->histogram,
@@ -77,11 +76,6 @@ Command measure_command() {
                     "curves");
                 app.add_option("--distance", o->distance,
                                "Measure how far the mesh is from this one, both ways, in Å");
-=======
-                app.add_option("mesh", o->in, "Mesh: " + mesh_endings_text())->required();
-                app.add_option("--histogram", o->histogram,
-                               "Write the histogram of the triangles' angles as a PNG here");
->>>>>>> formats
                 return [o](Session& session) { run_measure(*o, session); };
             }};
 }

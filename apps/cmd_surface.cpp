@@ -121,12 +121,7 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
 }
 
 void run_surface(const SurfaceOptions& o, Session& session) {
-<<<<<<< HEAD
     check_mesh_output(o.out);
-=======
-    if (!is_mesh_ending(o.out))
-        throw UsageError(fmt::format("{}: the ending tells the format: {}", o.out, mesh_endings_text()));
->>>>>>> formats
     const Isovalue rule = o.iso.parse();
     Json seconds;
     Clock clock;

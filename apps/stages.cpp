@@ -1,7 +1,6 @@
 #include "apps/stages.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -106,8 +105,6 @@ std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& pa
     }
     return names;
 }
-
-std::string mesh_endings_text() { return fmt::format("{}", fmt::join(mesh_endings(), " ")); }
 
 void check_mesh_output(const std::string& path) {
     if (!is_mesh_ending(path))

@@ -63,9 +63,6 @@ std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& pa
 /// UsageError unless a mesh can be written under this name.
 void check_mesh_output(const std::string& path);
 
-/// The endings of mesh files, for help texts: ".ply .obj …".
-std::string mesh_endings_text();
-
 /// The histogram of the triangles' angles (the paper's Fig 7) as a picture; of several meshes as curves.
 void write_angle_histogram(const MeshMeasures& measures, const std::string& path);
 void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasures>>& meshes,

@@ -33,7 +33,7 @@ struct DualSurfaceOptions {
 ///
 /// Cost: some 0.6 µs a triangle and 100 bytes, and a copy of the tree where the background is dense, a sample
 /// is not finite or lies outside the box. The same bytes for any number of threads. Throws InvalidInput for
-/// an isovalue that is not finite, an adaptivity outside 0…1 and 2^32 vertices or more; Cancelled, between
+/// an isovalue that is not finite, an adaptivity outside 0…1 and 2^32 triangles or more; Cancelled, between
 /// the stages.
 TriMesh dual_surface(const DensityMap& map, const DualSurfaceOptions& options, const Progress& progress = {});
 

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <unordered_map>
 #include <vector>
 
 #include "vdbgeo/core/errors.h"
@@ -116,10 +115,13 @@ void add_quad(TriMesh& mesh, const std::array<VertexId, 4>& q) {
 
 TriMesh triangles_of(openvdb::tools::VolumeToMesh& dual, const Frame& frame) {
     TriMesh mesh;
-    if (dual.pointListSize() > TriMesh::max_vertices)
-        throw InvalidInput(
-            fmt::format("the surface has {} vertices, more than 2^32-1", dual.pointListSize()));
+    std::uint64_t triangles = 0;
+    for (std::size_t k = 0; k < dual.polygonPoolListSize(); ++k)
+        triangles += 2 * dual.polygonPoolList()[k].numQuads() + dual.polygonPoolList()[k].numTriangles();
+    if (std::max<std::uint64_t>(dual.pointListSize(), triangles) > TriMesh::max_vertices)
+        throw InvalidInput(fmt::format("the surface has {} triangles, more than 2^32-1", triangles));
     mesh.points.resize(dual.pointListSize());
+    mesh.triangles.reserve(triangles);
     parallel_for(mesh.points.size(), 4096, [&](std::size_t v) {
         const openvdb::Vec3s& p = dual.pointList()[v];
         mesh.points[v] = frame.to_world(Vec3d(p.x(), p.y(), p.z())).cast<float>();
@@ -140,6 +142,31 @@ TriMesh triangles_of(openvdb::tools::VolumeToMesh& dual, const Frame& frame) {
     return mesh;
 }
 
+/// Takes away pairs of triangles that lie on each other back to back.
+void cancel_pairs(TriMesh& mesh) {
+    // Triangles by their lowest vertex, which they begin with.
+    std::vector<std::uint64_t> first(mesh.points.size() + 1, 0);
+    for (Triangle& t : mesh.triangles) {
+        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+        ++first[t[0] + 1];
+    }
+    for (std::size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
+    std::vector<std::uint64_t> next(first.begin(), first.end() - 1);
+    std::vector<VertexId> at(mesh.triangles.size());
+    for (std::size_t t = 0; t < at.size(); ++t) at[next[mesh.triangles[t][0]]++] = static_cast<VertexId>(t);
+    std::vector<bool> gone(at.size(), false);
+    for (std::size_t v = 0; v + 1 < first.size(); ++v)
+        for (std::uint64_t i = first[v]; i < first[v + 1]; ++i)
+            for (std::uint64_t j = i + 1; j < first[v + 1] && !gone[at[i]]; ++j) {
+                const Triangle &a = mesh.triangles[at[i]], &b = mesh.triangles[at[j]];
+                if (!gone[at[j]] && a[1] == b[2] && a[2] == b[1]) gone[at[i]] = gone[at[j]] = true;
+            }
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < gone.size(); ++t)
+        if (!gone[t]) mesh.triangles[kept++] = mesh.triangles[t];
+    mesh.triangles.resize(kept);
+}
+
 /// Draws the ends of sides without length together and takes away what has no area then: triangles that name
 /// a vertex twice, and pairs that lie on each other back to back. None of that opens the surface.
 void collapse(TriMesh& mesh) {
@@ -156,36 +183,13 @@ void collapse(TriMesh& mesh) {
             const VertexId from = root(a), into = root(b);
             to[std::max(from, into)] = std::min(from, into);
         }
-    // Which triangles are there, and how often more one way round than the other.
-    struct Hash {
-        std::size_t operator()(const Triangle& t) const {
-            return (t[0] * 0x9E3779B97F4A7C15ull ^ t[1]) * 0x9E3779B97F4A7C15ull ^ t[2];
-        }
-    };
-    const auto sorted = [](Triangle t) {
-        std::sort(t.begin(), t.end());
-        return t;
-    };
-    const auto turns = [&](const Triangle& t) {
-        const Triangle s = sorted(t);
-        const auto first = static_cast<std::size_t>(std::find(t.begin(), t.end(), s[0]) - t.begin());
-        return t[(first + 1) % 3] == s[1] ? 1 : -1;
-    };
-    std::unordered_map<Triangle, int, Hash> balance;
-    balance.reserve(mesh.triangles.size());
-    for (Triangle& t : mesh.triangles) {
-        for (VertexId& v : t) v = root(v);
-        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) balance[sorted(t)] += turns(t);
-    }
     std::size_t kept = 0;
-    for (const Triangle& t : mesh.triangles) {
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        int& left = balance[sorted(t)];
-        if (left * turns(t) <= 0) continue;
-        left -= turns(t);
-        mesh.triangles[kept++] = t;
+    for (Triangle t : mesh.triangles) {
+        for (VertexId& v : t) v = root(v);
+        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) mesh.triangles[kept++] = t;
     }
     mesh.triangles.resize(kept);
+    cancel_pairs(mesh);
 }
 
 void drop_unused(TriMesh& mesh) {

@@ -31,9 +31,9 @@ struct DualSurfaceOptions {
 /// adaptivity: a vertex at the mean of crossings knows nothing of the next sheet
 /// (measure/self_intersections.h).
 ///
-/// Cost: some 0.2 µs a triangle and 100 bytes, and a copy of the tree where the background is dense, a sample
+/// Cost: some 0.3 µs a triangle and 100 bytes, and a copy of the tree where the background is dense, a sample
 /// is not finite or lies outside the box. The same bytes for any number of threads. Throws InvalidInput for
-/// an isovalue that is not finite, an adaptivity outside 0…1 and 2^32 vertices or more; Cancelled, between
+/// an isovalue that is not finite, an adaptivity outside 0…1 and 2^32 triangles or more; Cancelled, between
 /// the stages.
 TriMesh dual_surface(const DensityMap& map, const DualSurfaceOptions& options, const Progress& progress = {});
 

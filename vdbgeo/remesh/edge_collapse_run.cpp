@@ -60,6 +60,7 @@ void EdgeCollapse::run(std::uint64_t faces, const Allowed& allowed, const Progre
         collapsed = 0;
         enqueue_all();
         for (VertexId v = queue_.front(); v != none && faces_left_ > faces; v = queue_.front()) {
+            prefetch_next(v);
             if (try_collapse(v, allowed)) ++collapsed;
             if (++tried % collapses_per_report == 0)
                 progress.report(static_cast<double>(start - faces_left_) /
@@ -68,6 +69,17 @@ void EdgeCollapse::run(std::uint64_t faces, const Allowed& allowed, const Progre
     }
     for (VertexId v = queue_.front(); v != none; v = queue_.front()) unqueue(v);
     progress.report(1);
+}
+
+/// Asks for what the next collapses will need: on big meshes the waits for memory are most of the time.
+void EdgeCollapse::prefetch_next(VertexId v) const {
+    const VertexId soon = queue_.after(v);
+    if (soon == none) return;
+    const Vertex& vertex = vertices_[soon];  // asked for in the last round
+    table_.prefetch(vertex.corner);
+    if (vertex.best.target != none) __builtin_prefetch(&vertices_[vertex.best.target]);
+    const VertexId later = queue_.after(soon);
+    if (later != none) __builtin_prefetch(&vertices_[later]);
 }
 
 /// Collapses the cheapest edge of a; where it must not, the next one takes its place in the queue.
@@ -144,7 +156,9 @@ void EdgeCollapse::merge(VertexId a, VertexId b, const EdgeFaces& faces, const V
 /// After b went into a: the edges around a have new costs.
 void EdgeCollapse::requeue_around(VertexId a, VertexId b) {
     gather(a, ring_a_);
+    for (const VertexId w : ring_a_.neighbours) __builtin_prefetch(&vertices_[w]);
     enqueue(a, find_best(a, ring_a_, lowest_floor));
+    for (const VertexId w : ring_a_.neighbours) table_.prefetch(vertices_[w].corner);
     for (std::size_t i = 0; i < ring_a_.neighbours.size(); ++i) {
         const VertexId w = ring_a_.neighbours[i];
         const Best& best = vertices_[w].best;

@@ -1,5 +1,6 @@
 // The greedy loop of EdgeCollapse: what it takes next, and what a collapse changes.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "vdbgeo/core/parallel.h"
@@ -20,7 +21,7 @@ EdgeCollapse::Best EdgeCollapse::find_best(VertexId v, const Ring& ring, const B
         const VertexId w = ring.neighbours[i];
         if (w < v) continue;
         const Best edge{static_cast<float>(place(v, w, spoke_is_line(ring, i)).cost), w};
-        if (floor < edge && edge < best) best = edge;
+        if (std::isfinite(edge.cost) && floor < edge && edge < best) best = edge;
     }
     return best;
 }

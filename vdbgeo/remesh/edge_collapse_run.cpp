@@ -9,7 +9,8 @@
 namespace vdbgeo {
 namespace {
 
-/// Refused edges are tried again, their surroundings having changed, when no others are left: this often.
+/// Refused edges are tried again, their surroundings having changed, when no others are left: this often
+/// at most, and as long as that gains half a per cent.
 constexpr int most_rounds = 20;
 constexpr std::uint64_t collapses_per_report = 8192;
 
@@ -56,8 +57,9 @@ void EdgeCollapse::enqueue_all() {
 
 void EdgeCollapse::run(std::uint64_t faces, const Allowed& allowed, const Progress& progress) {
     const std::uint64_t start = faces_left_;
-    std::uint64_t tried = 0, collapsed = 1;
-    for (int round = 0; round < most_rounds && faces_left_ > faces && collapsed > 0; ++round) {
+    std::uint64_t tried = 0, collapsed = start;
+    for (int round = 0; round < most_rounds && faces_left_ > faces && collapsed > faces_left_ / 200;
+         ++round) {
         collapsed = 0;
         enqueue_all();
         for (VertexId v = queue_.front(); v != none && faces_left_ > faces; v = queue_.front()) {

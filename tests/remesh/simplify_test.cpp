@@ -183,6 +183,21 @@ TEST(Simplify, BordersStay) {
     EXPECT_LT(surface_distance(pipe, fewer).hausdorff, 0.3);
 }
 
+TEST(Simplify, BordersAreNotJoined) {
+    // Down to what cannot go: no edge between two borders, or between two places of one, may vanish.
+    const TriMesh strip = open_cylinder_mesh(10, 1, 1, 24);
+    TriMesh meshes = strip;
+    for (const double height : {2.0, 30.0})
+        meshes = joined(meshes,
+                        moved(open_cylinder_mesh(10, height), Mat3d::Identity(), Vec3d(0, 0, 10 + height)));
+    const TriMesh least = to_faces(meshes, 0);
+    const Shape shape = shape_of(least);
+    EXPECT_TRUE(shape.manifold);
+    EXPECT_EQ(shape.components, 3u);
+    EXPECT_EQ(shape.euler, 0);
+    EXPECT_GE(shape.borders, 18u);
+}
+
 TEST(Simplify, AFlatSquareKeepsItsCorners) {
     TriMesh square;
     const VertexId n = 31;

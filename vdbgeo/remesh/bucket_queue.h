@@ -42,6 +42,9 @@ class BucketQueue {
         return lowest_ < buckets_.size() ? buckets_[lowest_].first : none;
     }
 
+    /// The one after an element of the queue, as long as it is of like cost; else `none`. For prefetching.
+    std::uint32_t after(std::uint32_t element) const { return links_[element].after; }
+
  private:
     struct Link {
         std::uint32_t before, after;

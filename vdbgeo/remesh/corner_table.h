@@ -46,6 +46,8 @@ class CornerTable {
         return o == none ? none : previous(o);
     }
 
+    void prefetch(Corner c) const { __builtin_prefetch(&faces_[c >> 2]); }
+
     std::size_t face_count() const { return faces_.size(); }
     bool gone(std::uint32_t face) const { return faces_[face].vertices[0] == none; }
     void remove(std::uint32_t face) { faces_[face].vertices[0] = none; }

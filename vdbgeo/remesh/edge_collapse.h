@@ -107,6 +107,7 @@ class EdgeCollapse {
     void unqueue(VertexId v);
     void enqueue(VertexId v, const Best& best);
     void enqueue_all();
+    void prefetch_next(VertexId v) const;
     bool try_collapse(VertexId a, const Allowed& allowed);
     void merge(VertexId a, VertexId b, const EdgeFaces& faces, const Vec3f& to);
     void remove_face(Corner at_a, Corner at_b);

@@ -45,7 +45,8 @@ VertexNeighbours::VertexNeighbours(const TriMesh& mesh) {
     Array<char> sides;
     sides.assign(points, 0);
     for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-        for (const VertexId v : mesh.triangles[f]) sides[v] |= cap->values[f] > 0.5f ? 1 : 2;
+        for (const VertexId v : mesh.triangles[f])
+            sides[v] = static_cast<char>(sides[v] | (cap->values[f] > 0.5f ? 1 : 2));
     for (std::size_t v = 0; v < points; ++v)
         if (sides[v] == 3) fixed[v] = 1;
 }

@@ -184,6 +184,7 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
     const int x0 = side & 1 ? dim : 0, y0 = side & 2 ? dim : 0;
     const int nx = side & 1 ? 1 : dim, ny = side & 2 ? 1 : dim;
     for (int x = 0; x < nx; ++x) {
+        if (!(edges.crossed[0][x] | edges.crossed[1][x] | edges.crossed[2][x])) continue;
         const std::uint32_t layer_first = first_vertex + edges.layer_first[x];
         for (int y = 0; y < ny; ++y) {
             const std::uint32_t first = layer_first + (edges.row_first[x] >> 8 * y & 0xFF);
@@ -191,8 +192,8 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
             if (side & 4) {
                 row[dim][0] = first;
                 row[dim][1] = first + static_cast<std::uint32_t>(edges.crossed[0][x] >> 8 * y & 1);
-            } else {
-                number_row(row_edges(edges, x, y), first, row[0]);
+            } else if (const std::uint32_t crossed = row_edges(edges, x, y)) {
+                number_row(crossed, first, row[0]);
             }
         }
     }

@@ -268,7 +268,8 @@ void CrossingBlocks::prefetch(std::size_t b) const {
 }
 
 void CrossingBlocks::load(std::size_t b, BlockSamples& out) const {
-    if (b + 1 < blocks_.size()) prefetch(b + 1);
+    constexpr std::size_t ahead = 2;
+    if (b + ahead < blocks_.size()) prefetch(b + ahead);
     for (int side = 0; side < 8; ++side) load_rows(blocks_[b], side, out);
 }
 

@@ -222,8 +222,12 @@ class Extraction {
             mesh_.points.data()->data() + 3 * (last ? mesh_.points.size() : cells_[end].first_vertex);
         filling.end_of_triangles =
             mesh_.triangles.data()->data() + 3 * (last ? mesh_.triangles.size() : cells_[end].first_triangle);
-        fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
-        fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
+        // Smaller arrays may come from memory that the process has used before.
+        constexpr std::size_t large = std::size_t{32} << 20;
+        if (mesh_.points.size() * sizeof(Vec3f) >= large)
+            fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
+        if (mesh_.triangles.size() * sizeof(Triangle) >= large)
+            fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
         const cell::PatternId* patterns = patterns_[begin / chunk].data();
         for (std::size_t b = begin; b < end; ++b) {
             filling.block = b;

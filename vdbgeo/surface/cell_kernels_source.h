@@ -20,9 +20,7 @@ void sign_words(const float* values, float isovalue, BlockBits words) {
     };
 #elif defined(__SSE2__)
     const __m128 iso = _mm_set1_ps(isovalue);
-    const auto four = [&](int i) {
-        return _mm_castps_si128(_mm_cmpge_ps(_mm_loadu_ps(values + i), iso));
-    };
+    const auto four = [&](int i) { return _mm_castps_si128(_mm_cmpge_ps(_mm_loadu_ps(values + i), iso)); };
     const auto bits = [&](int i) -> std::uint64_t {
         const __m128i low = _mm_packs_epi32(four(i), four(i + 4)),
                       high = _mm_packs_epi32(four(i + 8), four(i + 12));
@@ -107,8 +105,7 @@ void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
         for (int i = 0; i < tests_at_once; ++i) {
             const int cell = test[i].open.cell;
             const float* at = samples + (cell >> 6) * layer + (cell >> 3 & 7) * row + (cell & 7);
-            for (int k = 0; k < 4; ++k)
-                corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
+            for (int k = 0; k < 4; ++k) corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
             first_diagonal[i] = test[i].diagonal ? 0 : -1;
         }
         Masks wanted;  // column k is inside in the slices looked at
@@ -140,7 +137,8 @@ void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
         decide(to, at_to);
         decide(extreme, at_extreme);
         const Masks begin = at_from >= zero, end = at_to >= zero, between = at_extreme >= zero;
-        const Masks change = (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
+        const Masks change =
+            (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
         alignas(64) long long answer[tests_at_once];
         __builtin_memcpy(answer, &change, sizeof(answer));
         for (int i = 0; i < tests_at_once; ++i) test[i].change = answer[i] != 0;
@@ -170,8 +168,8 @@ void number_row(std::uint32_t crossed, std::uint32_t first, std::uint32_t* out) 
     const __m512i next = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     const auto low = static_cast<__mmask16>(crossed), high = static_cast<__mmask16>(crossed >> 16);
     const auto numbers = [&](__mmask16 mask, unsigned from) {
-        return _mm512_maskz_expand_epi32(
-            mask, _mm512_add_epi32(next, _mm512_set1_epi32(static_cast<int>(from))));
+        return _mm512_maskz_expand_epi32(mask,
+                                         _mm512_add_epi32(next, _mm512_set1_epi32(static_cast<int>(from))));
     };
     _mm512_store_si512(out, numbers(low, first));
     _mm512_store_si512(out + 16, numbers(high, first + static_cast<unsigned>(__builtin_popcount(low))));
@@ -199,13 +197,13 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
     }
 }
 
-/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of the
-/// samples in the block.
+/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of
+/// the samples in the block.
 void place_on_edges(const float* here, const float* next, const Doubles& place, int axis,
                     const DiagonalPlacing& placing, float out[dim]) {
     const double iso = placing.isovalue;
     const Doubles zero{}, one = zero + 1, middle = zero + 0.5, least = zero + placing.nearest,
-                  most = one - placing.nearest;
+                          most = one - placing.nearest;
     Floats from, to;
     __builtin_memcpy(&from, here, sizeof(from));
     __builtin_memcpy(&to, next, sizeof(to));
@@ -320,7 +318,7 @@ void draw(const DrawingTask& task) {
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), sign_words,     list_patterns, settle,
-                                take_numbers,                place_vertices, draw};
+const Kernels VDBGEO_KERNELS = {
+    VDBGEO_NAME(VDBGEO_KERNELS), sign_words, list_patterns, settle, take_numbers, place_vertices, draw};
 
 }  // namespace vdbgeo::cell

@@ -90,19 +90,28 @@ Counts list_patterns(const BlockBits active, const std::uint64_t* const corners[
     return n;
 }
 
-// Eight at a time; the compiler makes of them what the CPU has.
-using Floats = float __attribute__((vector_size(dim * sizeof(float))));
-using Doubles = double __attribute__((vector_size(dim * sizeof(double))));
-using Masks = long long __attribute__((vector_size(dim * sizeof(long long))));
+// As many at a time as the CPU's registers hold: of wider vectors the compiler makes scalar code.
+#if defined(__AVX512F__)
+constexpr int lanes = 8;
+#elif defined(__AVX2__)
+constexpr int lanes = 4;
+#else
+constexpr int lanes = 2;
+#endif
+using Floats = float __attribute__((vector_size(lanes * sizeof(float))));
+using Doubles = double __attribute__((vector_size(lanes * sizeof(double))));
+using Masks = long long __attribute__((vector_size(lanes * sizeof(long long))));
+
+static_assert(tests_at_once % lanes == 0 && dim % lanes == 0);
 
 void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
     constexpr int row = sample_stride, layer = (dim + 1) * sample_stride;
     constexpr int column[4] = {0, layer, layer + row, row};  // around the slice
     const Doubles zero{};
-    for (SliceTest* test = tests; test < tests + count; test += tests_at_once) {
-        alignas(64) float corner[2][4][tests_at_once];
-        alignas(64) long long first_diagonal[tests_at_once];
-        for (int i = 0; i < tests_at_once; ++i) {
+    for (SliceTest* test = tests; test < tests + count; test += lanes) {
+        alignas(64) float corner[2][4][lanes];
+        alignas(64) long long first_diagonal[lanes];
+        for (int i = 0; i < lanes; ++i) {
             const int cell = test[i].open.cell;
             const float* at = samples + (cell >> 6) * layer + (cell >> 3 & 7) * row + (cell & 7);
             for (int k = 0; k < 4; ++k) corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
@@ -139,9 +148,9 @@ void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
         const Masks begin = at_from >= zero, end = at_to >= zero, between = at_extreme >= zero;
         const Masks change =
             (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
-        alignas(64) long long answer[tests_at_once];
+        alignas(64) long long answer[lanes];
         __builtin_memcpy(answer, &change, sizeof(answer));
-        for (int i = 0; i < tests_at_once; ++i) test[i].change = answer[i] != 0;
+        for (int i = 0; i < lanes; ++i) test[i].change = answer[i] != 0;
     }
 }
 
@@ -199,23 +208,27 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
 
 /// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of
 /// the samples in the block.
-void place_on_edges(const float* here, const float* next, const Doubles& place, int axis,
+void place_on_edges(const float* here, const float* next, const double place[dim], int axis,
                     const DiagonalPlacing& placing, float out[dim]) {
     const double iso = placing.isovalue;
     const Doubles zero{}, one = zero + 1, middle = zero + 0.5, least = zero + placing.nearest,
                           most = one - placing.nearest;
-    Floats from, to;
-    __builtin_memcpy(&from, here, sizeof(from));
-    __builtin_memcpy(&to, next, sizeof(to));
-    const Doubles low = __builtin_convertvector(from, Doubles) - iso,
-                  high = __builtin_convertvector(to, Doubles) - iso;
-    Doubles t = low / (low - high);
-    t = (t >= zero) & (t <= one) ? t : middle;  // a sample is not a finite number
-    t = t > least ? t : least;
-    t = t < most ? t : most;
-    t = placing.origin[axis] + placing.step[axis] * (placing.index[axis] + (place + t));
-    const Floats at = __builtin_convertvector(t, Floats);
-    __builtin_memcpy(out, &at, sizeof(at));
+    for (int z = 0; z < dim; z += lanes) {
+        Floats from, to;
+        Doubles start;
+        __builtin_memcpy(&from, here + z, sizeof(from));
+        __builtin_memcpy(&to, next + z, sizeof(to));
+        __builtin_memcpy(&start, place + z, sizeof(start));
+        const Doubles low = __builtin_convertvector(from, Doubles) - iso,
+                      high = __builtin_convertvector(to, Doubles) - iso;
+        Doubles t = low / (low - high);
+        t = (t >= zero) & (t <= one) ? t : middle;  // a sample is not a finite number
+        t = t > least ? t : least;
+        t = t < most ? t : most;
+        t = placing.origin[axis] + placing.step[axis] * (placing.index[axis] + (start + t));
+        const Floats at = __builtin_convertvector(t, Floats);
+        __builtin_memcpy(out + z, &at, sizeof(at));
+    }
 }
 
 void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalPlacing& placing, float* out) {
@@ -224,7 +237,7 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
     const auto coordinate = [&](int axis, int i) {
         return static_cast<float>(placing.origin[axis] + placing.step[axis] * (placing.index[axis] + i));
     };
-    Doubles zs;
+    alignas(64) double zs[dim], xs[dim], ys[dim];
     alignas(16) float above[dim][4] = {};  // what z adds to the place of a sample
     for (int z = 0; z < dim; ++z) zs[z] = z, above[z][2] = coordinate(2, z);
     for (int x = 0; x < dim; ++x)
@@ -233,9 +246,9 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
             if (!crossed) continue;
             const float* here = samples + x * layer + y * row;
             alignas(64) float moved[4][dim];
-            const Doubles zeros{};
-            place_on_edges(here, here + layer, zeros + x, 0, placing, moved[0]);
-            place_on_edges(here, here + row, zeros + y, 1, placing, moved[1]);
+            for (int z = 0; z < dim; ++z) xs[z] = x, ys[z] = y;
+            place_on_edges(here, here + layer, xs, 0, placing, moved[0]);
+            place_on_edges(here, here + row, ys, 1, placing, moved[1]);
             place_on_edges(here, here + 1, zs, 2, placing, moved[2]);
             const float at_x = coordinate(0, x), at_y = coordinate(1, y);
 #if defined(__SSE2__)

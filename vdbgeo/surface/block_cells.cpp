@@ -45,10 +45,10 @@ void find_edges(const CornerSigns& s, const Vec3i& n, BlockCells& out) {
         out.edges.row_first[x] = up_to_row << 8;
         out.edges.layer_first[x] = static_cast<std::uint16_t>(vertices);
         vertices += static_cast<unsigned>(up_to_row >> 56);
-        const std::uint64_t any = corner | s.y[x] | s.z[x] | s.yz[x] | s.here[x + 1] | s.y[x + 1] |
-                                  s.z[x + 1] | s.yz[x + 1];
-        const std::uint64_t all = corner & s.y[x] & s.z[x] & s.yz[x] & s.here[x + 1] & s.y[x + 1] &
-                                  s.z[x + 1] & s.yz[x + 1];
+        const std::uint64_t any =
+            corner | s.y[x] | s.z[x] | s.yz[x] | s.here[x + 1] | s.y[x + 1] | s.z[x + 1] | s.yz[x + 1];
+        const std::uint64_t all =
+            corner & s.y[x] & s.z[x] & s.yz[x] & s.here[x + 1] & s.y[x + 1] & s.z[x + 1] & s.yz[x + 1];
         out.active[x] = with_x ? any & ~all & with_both : 0;
     }
     out.edge_vertices = static_cast<std::uint16_t>(vertices);

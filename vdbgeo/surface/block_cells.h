@@ -19,8 +19,8 @@ struct BlockCells {
     std::uint64_t first_vertex, first_triangle;
 };
 
-/// Fills `edges`, `active` and `edge_vertices`. `samples`: how many of the block's samples and of the next layer
-/// lie in the box, along each axis (2…9).
+/// Fills `edges`, `active` and `edge_vertices`. `samples`: how many of the block's samples and of the next
+/// layer lie in the box, along each axis (2…9).
 void find_edges(const CornerSigns& signs, const Vec3i& samples, BlockCells& out);
 
 /// The ambiguous faces of the active cells. Returns whether there are any.

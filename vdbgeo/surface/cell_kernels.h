@@ -7,7 +7,7 @@
 
 namespace vdbgeo::cell {
 
-constexpr int block_dim = 8;     // cells along an edge of a block; its samples have one more
+constexpr int block_dim = 8;  // cells along an edge of a block; its samples have one more
 constexpr int block_cells = 512;
 constexpr int sample_stride = 12;  // floats from row to row of a block's samples
 
@@ -20,7 +20,8 @@ struct FaceBits {
     BlockBits lower[3], upper[3];
 };
 
-/// The crossed edges of a block's samples and their vertices' numbers. Those go by row (x, y), then z, then axis.
+/// The crossed edges of a block's samples and their vertices' numbers. Those go by row (x, y), then z, then
+/// axis.
 struct EdgeBits {
     BlockBits crossed[3];
     BlockBits row_first;  ///< byte y of word x: the first vertex of row (x, y), from the first of the layer x
@@ -54,8 +55,8 @@ struct Drawing {
 
 /// What a block's cells are drawn with. Writes may reach further than what is drawn, but not to `end`.
 struct DrawingTask {
-    const std::uint64_t* active;     ///< the cells
-    const std::uint16_t* pattern;    ///< of each active cell
+    const std::uint64_t* active;   ///< the cells
+    const std::uint16_t* pattern;  ///< of each active cell
     const VertexNumbers* numbers;
     Drawing drawing;
     std::uint32_t *out, *end;
@@ -65,12 +66,13 @@ struct DrawingTask {
     void* context;
 };
 
-/// Where vertices lie in a frame whose axes are those of the world: origin + step · (index + place in the block).
+/// Where vertices lie in a frame whose axes are those of the world: origin + step · (index + place in the
+/// block).
 struct DiagonalPlacing {
     double origin[3], step[3], index[3];
     double isovalue;
-    double nearest;     ///< to the ends of an edge
-    const float* end;   ///< writes may reach one float further than the vertices, but not to here
+    double nearest;    ///< to the ends of an edge
+    const float* end;  ///< writes may reach one float further than the vertices, but not to here
 };
 
 /// A cell whose pattern its corner values are to settle.
@@ -79,8 +81,8 @@ struct OpenCell {
     std::uint16_t item;  ///< its place among the block's active cells
 };
 
-/// Whether the arcs of a cell's slices z = t change while the slice's corners (0, 0) and (1, 1), or the other two,
-/// alone are inside.
+/// Whether the arcs of a cell's slices z = t change while the slice's corners (0, 0) and (1, 1), or the other
+/// two, alone are inside.
 struct SliceTest {
     OpenCell open;
     std::uint8_t diagonal;  ///< 0, 1
@@ -98,15 +100,17 @@ struct Kernels {
     /// Bit 8·y + z of word x: values[64·x + 8·y + z] ≥ isovalue.
     void (*sign_words)(const float* values, float isovalue, BlockBits words);
     /// The active cells' patterns by their keys: `of_key` is a PatternTable's, corner c's signs are in
-    /// corners[c]. Those with the highest bit set are listed. Returns how many cells there are, and of the list.
-    Counts (*list_patterns)(const BlockBits active, const std::uint64_t* const corners[8], const FaceBits* faces,
-                            const std::uint16_t* of_key, std::uint16_t* patterns, OpenCell* open);
-    /// Settles the tests. The sign changes along z bound an interval of t; in it the arcs change at a zero of a
-    /// quadratic. Exact, in place of the case-by-case tests of Chernyaev (1995). `count` is a multiple of
+    /// corners[c]. Those with the highest bit set are listed. Returns how many cells there are, and of the
+    /// list.
+    Counts (*list_patterns)(const BlockBits active, const std::uint64_t* const corners[8],
+                            const FaceBits* faces, const std::uint16_t* of_key, std::uint16_t* patterns,
+                            OpenCell* open);
+    /// Settles the tests. The sign changes along z bound an interval of t; in it the arcs change at a zero of
+    /// a quadratic. Exact, in place of the case-by-case tests of Chernyaev (1995). `count` is a multiple of
     /// `tests_at_once`.
     void (*settle)(const float* samples, float isovalue, SliceTest* tests, int count);
-    /// Takes the vertices of the block (side 0) or of an upper neighbour (bit a: along axis a) that lie on the
-    /// block's cells.
+    /// Takes the vertices of the block (side 0) or of an upper neighbour (bit a: along axis a) that lie on
+    /// the block's cells.
     void (*take_numbers)(const EdgeBits& edges, std::uint32_t first_vertex, int side, VertexNumbers& numbers);
     /// The vertices on a block's edges.
     void (*place_vertices)(const float* samples, const EdgeBits& edges, const DiagonalPlacing& placing,

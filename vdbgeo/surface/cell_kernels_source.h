@@ -20,9 +20,7 @@ void sign_words(const float* values, float isovalue, BlockBits words) {
     };
 #elif defined(__SSE2__)
     const __m128 iso = _mm_set1_ps(isovalue);
-    const auto four = [&](int i) {
-        return _mm_castps_si128(_mm_cmpge_ps(_mm_loadu_ps(values + i), iso));
-    };
+    const auto four = [&](int i) { return _mm_castps_si128(_mm_cmpge_ps(_mm_loadu_ps(values + i), iso)); };
     const auto bits = [&](int i) -> std::uint64_t {
         const __m128i low = _mm_packs_epi32(four(i), four(i + 4)),
                       high = _mm_packs_epi32(four(i + 8), four(i + 12));
@@ -92,23 +90,31 @@ Counts list_patterns(const BlockBits active, const std::uint64_t* const corners[
     return n;
 }
 
-// Eight at a time; the compiler makes of them what the CPU has.
-using Floats = float __attribute__((vector_size(dim * sizeof(float))));
-using Doubles = double __attribute__((vector_size(dim * sizeof(double))));
-using Masks = long long __attribute__((vector_size(dim * sizeof(long long))));
+// As many at a time as the CPU's registers hold: of wider vectors the compiler makes scalar code.
+#if defined(__AVX512F__)
+constexpr int lanes = 8;
+#elif defined(__AVX2__)
+constexpr int lanes = 4;
+#else
+constexpr int lanes = 2;
+#endif
+using Floats = float __attribute__((vector_size(lanes * sizeof(float))));
+using Doubles = double __attribute__((vector_size(lanes * sizeof(double))));
+using Masks = long long __attribute__((vector_size(lanes * sizeof(long long))));
+
+static_assert(tests_at_once % lanes == 0 && dim % lanes == 0);
 
 void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
     constexpr int row = sample_stride, layer = (dim + 1) * sample_stride;
     constexpr int column[4] = {0, layer, layer + row, row};  // around the slice
     const Doubles zero{};
-    for (SliceTest* test = tests; test < tests + count; test += tests_at_once) {
-        alignas(64) float corner[2][4][tests_at_once];
-        alignas(64) long long first_diagonal[tests_at_once];
-        for (int i = 0; i < tests_at_once; ++i) {
+    for (SliceTest* test = tests; test < tests + count; test += lanes) {
+        alignas(64) float corner[2][4][lanes];
+        alignas(64) long long first_diagonal[lanes];
+        for (int i = 0; i < lanes; ++i) {
             const int cell = test[i].open.cell;
             const float* at = samples + (cell >> 6) * layer + (cell >> 3 & 7) * row + (cell & 7);
-            for (int k = 0; k < 4; ++k)
-                corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
+            for (int k = 0; k < 4; ++k) corner[0][k][i] = at[column[k]], corner[1][k][i] = at[column[k] + 1];
             first_diagonal[i] = test[i].diagonal ? 0 : -1;
         }
         Masks wanted;  // column k is inside in the slices looked at
@@ -140,10 +146,11 @@ void settle(const float* samples, float isovalue, SliceTest* tests, int count) {
         decide(to, at_to);
         decide(extreme, at_extreme);
         const Masks begin = at_from >= zero, end = at_to >= zero, between = at_extreme >= zero;
-        const Masks change = (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
-        alignas(64) long long answer[tests_at_once];
+        const Masks change =
+            (from < to) & ((begin ^ end) | ((extreme > from) & (extreme < to) & (between ^ begin)));
+        alignas(64) long long answer[lanes];
         __builtin_memcpy(answer, &change, sizeof(answer));
-        for (int i = 0; i < tests_at_once; ++i) test[i].change = answer[i] != 0;
+        for (int i = 0; i < lanes; ++i) test[i].change = answer[i] != 0;
     }
 }
 
@@ -170,8 +177,8 @@ void number_row(std::uint32_t crossed, std::uint32_t first, std::uint32_t* out) 
     const __m512i next = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     const auto low = static_cast<__mmask16>(crossed), high = static_cast<__mmask16>(crossed >> 16);
     const auto numbers = [&](__mmask16 mask, unsigned from) {
-        return _mm512_maskz_expand_epi32(
-            mask, _mm512_add_epi32(next, _mm512_set1_epi32(static_cast<int>(from))));
+        return _mm512_maskz_expand_epi32(mask,
+                                         _mm512_add_epi32(next, _mm512_set1_epi32(static_cast<int>(from))));
     };
     _mm512_store_si512(out, numbers(low, first));
     _mm512_store_si512(out + 16, numbers(high, first + static_cast<unsigned>(__builtin_popcount(low))));
@@ -184,6 +191,7 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
     const int x0 = side & 1 ? dim : 0, y0 = side & 2 ? dim : 0;
     const int nx = side & 1 ? 1 : dim, ny = side & 2 ? 1 : dim;
     for (int x = 0; x < nx; ++x) {
+        if (!(edges.crossed[0][x] | edges.crossed[1][x] | edges.crossed[2][x])) continue;
         const std::uint32_t layer_first = first_vertex + edges.layer_first[x];
         for (int y = 0; y < ny; ++y) {
             const std::uint32_t first = layer_first + (edges.row_first[x] >> 8 * y & 0xFF);
@@ -191,32 +199,36 @@ void take_numbers(const EdgeBits& edges, std::uint32_t first_vertex, int side, V
             if (side & 4) {
                 row[dim][0] = first;
                 row[dim][1] = first + static_cast<std::uint32_t>(edges.crossed[0][x] >> 8 * y & 1);
-            } else {
-                number_row(row_edges(edges, x, y), first, row[0]);
+            } else if (const std::uint32_t crossed = row_edges(edges, x, y)) {
+                number_row(crossed, first, row[0]);
             }
         }
     }
 }
 
-/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of the
-/// samples in the block.
-void place_on_edges(const float* here, const float* next, const Doubles& place, int axis,
+/// For the eight samples of a row the coordinate, along the edge to `next`, of the vertex there; `place`: of
+/// the samples in the block.
+void place_on_edges(const float* here, const float* next, const double place[dim], int axis,
                     const DiagonalPlacing& placing, float out[dim]) {
     const double iso = placing.isovalue;
     const Doubles zero{}, one = zero + 1, middle = zero + 0.5, least = zero + placing.nearest,
-                  most = one - placing.nearest;
-    Floats from, to;
-    __builtin_memcpy(&from, here, sizeof(from));
-    __builtin_memcpy(&to, next, sizeof(to));
-    const Doubles low = __builtin_convertvector(from, Doubles) - iso,
-                  high = __builtin_convertvector(to, Doubles) - iso;
-    Doubles t = low / (low - high);
-    t = (t >= zero) & (t <= one) ? t : middle;  // a sample is not a finite number
-    t = t > least ? t : least;
-    t = t < most ? t : most;
-    t = placing.origin[axis] + placing.step[axis] * (placing.index[axis] + (place + t));
-    const Floats at = __builtin_convertvector(t, Floats);
-    __builtin_memcpy(out, &at, sizeof(at));
+                          most = one - placing.nearest;
+    for (int z = 0; z < dim; z += lanes) {
+        Floats from, to;
+        Doubles start;
+        __builtin_memcpy(&from, here + z, sizeof(from));
+        __builtin_memcpy(&to, next + z, sizeof(to));
+        __builtin_memcpy(&start, place + z, sizeof(start));
+        const Doubles low = __builtin_convertvector(from, Doubles) - iso,
+                      high = __builtin_convertvector(to, Doubles) - iso;
+        Doubles t = low / (low - high);
+        t = (t >= zero) & (t <= one) ? t : middle;  // a sample is not a finite number
+        t = t > least ? t : least;
+        t = t < most ? t : most;
+        t = placing.origin[axis] + placing.step[axis] * (placing.index[axis] + (start + t));
+        const Floats at = __builtin_convertvector(t, Floats);
+        __builtin_memcpy(out + z, &at, sizeof(at));
+    }
 }
 
 void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalPlacing& placing, float* out) {
@@ -225,7 +237,7 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
     const auto coordinate = [&](int axis, int i) {
         return static_cast<float>(placing.origin[axis] + placing.step[axis] * (placing.index[axis] + i));
     };
-    Doubles zs;
+    alignas(64) double zs[dim], xs[dim], ys[dim];
     alignas(16) float above[dim][4] = {};  // what z adds to the place of a sample
     for (int z = 0; z < dim; ++z) zs[z] = z, above[z][2] = coordinate(2, z);
     for (int x = 0; x < dim; ++x)
@@ -234,9 +246,9 @@ void place_vertices(const float* samples, const EdgeBits& edges, const DiagonalP
             if (!crossed) continue;
             const float* here = samples + x * layer + y * row;
             alignas(64) float moved[4][dim];
-            const Doubles zeros{};
-            place_on_edges(here, here + layer, zeros + x, 0, placing, moved[0]);
-            place_on_edges(here, here + row, zeros + y, 1, placing, moved[1]);
+            for (int z = 0; z < dim; ++z) xs[z] = x, ys[z] = y;
+            place_on_edges(here, here + layer, xs, 0, placing, moved[0]);
+            place_on_edges(here, here + row, ys, 1, placing, moved[1]);
             place_on_edges(here, here + 1, zs, 2, placing, moved[2]);
             const float at_x = coordinate(0, x), at_y = coordinate(1, y);
 #if defined(__SSE2__)
@@ -319,7 +331,7 @@ void draw(const DrawingTask& task) {
 extern const Kernels VDBGEO_KERNELS;
 #define VDBGEO_TEXT(name) #name
 #define VDBGEO_NAME(name) VDBGEO_TEXT(name)
-const Kernels VDBGEO_KERNELS = {VDBGEO_NAME(VDBGEO_KERNELS), sign_words,     list_patterns, settle,
-                                take_numbers,                place_vertices, draw};
+const Kernels VDBGEO_KERNELS = {
+    VDBGEO_NAME(VDBGEO_KERNELS), sign_words, list_patterns, settle, take_numbers, place_vertices, draw};
 
 }  // namespace vdbgeo::cell

@@ -268,8 +268,8 @@ constexpr int top_offset = 2;                 // to the same edges at z=1
 constexpr bool is_inside_slice(int k, int diagonal) { return (k & 1) == diagonal; }
 
 /// The two loops that the arcs of an alternating slice belong to; nothing where the cell has no such slice or
-/// all belong to one. Along a side face the arcs' ends follow a contour, which is part of one loop, so arcs of
-/// two loops lie in one piece only where they meet inside the cell.
+/// all belong to one. Along a side face the arcs' ends follow a contour, which is part of one loop, so arcs
+/// of two loops lie in one piece only where they meet inside the cell.
 std::optional<std::pair<int, int>> loops_of_slice(int sign_case, int diagonal,
                                                   const std::array<int, edges>& loop_of_edge) {
     std::array<bool, 4> from_bottom, to_top;

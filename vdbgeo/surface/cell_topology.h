@@ -31,31 +31,31 @@ struct Pattern {
     std::array<std::array<std::uint8_t, 3>, max_triangles> triangles{};
 };
 
-/// Number of a pattern in the table; with the bit `unsettled` the one without a tunnel, where the corner values
-/// tell whether there is one.
+/// Number of a pattern in the table; with the bit `unsettled` the one without a tunnel, where the corner
+/// values tell whether there is one.
 using PatternId = std::uint16_t;
 constexpr PatternId unsettled = 0x8000, no_pattern = 0xFFFF;
 
-/// For a pattern without a tunnel the ones that have it. Two loops are joined by a tunnel where the level set of a
-/// slice z = t changes from one pair of arcs to the other. It can while the slice's corners alternate in sign:
-/// the first pattern is that of a change while its corners (0, 0) and (1, 1) are inside, the second that of a
-/// change while the other two are; no_pattern where neither would join loops.
+/// For a pattern without a tunnel the ones that have it. Two loops are joined by a tunnel where the level set
+/// of a slice z = t changes from one pair of arcs to the other. It can while the slice's corners alternate in
+/// sign: the first pattern is that of a change while its corners (0, 0) and (1, 1) are inside, the second
+/// that of a change while the other two are; no_pattern where neither would join loops.
 using TunnelPatterns = std::array<PatternId, 2>;
 
 /// All patterns, and which of them a cell has.
 struct PatternTable {
     std::vector<Pattern> patterns;
     std::vector<TunnelPatterns> tunnels;  ///< of each pattern
-    /// By the cell's key: bit c, corner c is inside; bit 8 + f, the inside corners of face f are joined across
-    /// it. The latter counts where the face is ambiguous (inside corners at both ends of one diagonal alone)
-    /// and is ignored elsewhere.
+    /// By the cell's key: bit c, corner c is inside; bit 8 + f, the inside corners of face f are joined
+    /// across it. The latter counts where the face is ambiguous (inside corners at both ends of one diagonal
+    /// alone) and is ignored elsewhere.
     std::array<PatternId, 1 << (corners + faces)> of_key;
 };
 const PatternTable& pattern_table();
 
-/// Whether the inside corners of an ambiguous face are joined: by the asymptotic decider (Nielson & Hamann 1991),
-/// which depends on the four values of the face alone, so that the two cells at a face agree. Values minus the
-/// isovalue: of the ends of the diagonal that is inside, and of the other's.
+/// Whether the inside corners of an ambiguous face are joined: by the asymptotic decider (Nielson & Hamann
+/// 1991), which depends on the four values of the face alone, so that the two cells at a face agree. Values
+/// minus the isovalue: of the ends of the diagonal that is inside, and of the other's.
 inline bool joined_across_face(double inside_a, double inside_b, double outside_a, double outside_b) {
     return inside_a * inside_b >= outside_a * outside_b;
 }

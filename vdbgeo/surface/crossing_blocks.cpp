@@ -1,7 +1,7 @@
 #include "vdbgeo/surface/crossing_blocks.h"
 
-#include <xmmintrin.h>
 #include <fmt/format.h>
+#include <xmmintrin.h>
 
 #include <algorithm>
 #include <cstring>
@@ -24,8 +24,7 @@ Coord offset(const Coord& c, int side, int step) {
 
 constexpr LeafSigns all_below{}, all_above{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
 
-constexpr std::uint64_t last_of_rows = 0x8080808080808080ull,
-                        first_of_rows = 0x0101010101010101ull;
+constexpr std::uint64_t last_of_rows = 0x8080808080808080ull, first_of_rows = 0x0101010101010101ull;
 
 /// The word of the samples one step further along y, or z, where `next` is the upper neighbour's.
 std::uint64_t step_y(std::uint64_t word, std::uint64_t next) { return word >> 8 | next << 56; }
@@ -268,7 +267,8 @@ void CrossingBlocks::prefetch(std::size_t b) const {
 }
 
 void CrossingBlocks::load(std::size_t b, BlockSamples& out) const {
-    if (b + 1 < blocks_.size()) prefetch(b + 1);
+    constexpr std::size_t ahead = 2;
+    if (b + ahead < blocks_.size()) prefetch(b + ahead);
     for (int side = 0; side < 8; ++side) load_rows(blocks_[b], side, out);
 }
 

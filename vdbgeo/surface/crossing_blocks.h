@@ -18,8 +18,8 @@ struct LeafSigns {
     std::uint64_t word[leaf::dim];
 };
 
-/// The signs at the corners of a block's cells: bit 8·y + z of word x is the sample at (x, y, z) in `here`, at
-/// (x, y+1, z) in `y`, at (x, y, z+1) in `z` and at (x, y+1, z+1) in `yz`.
+/// The signs at the corners of a block's cells: bit 8·y + z of word x is the sample at (x, y, z) in `here`,
+/// at (x, y+1, z) in `y`, at (x, y, z+1) in `z` and at (x, y+1, z+1) in `yz`.
 struct CornerSigns {
     std::uint64_t here[leaf::dim + 1], y[leaf::dim + 1], z[leaf::dim + 1], yz[leaf::dim + 1];
 };

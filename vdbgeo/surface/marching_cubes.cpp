@@ -38,8 +38,8 @@ class DrawingTable {
             if (special) continue;
             for (int i = 0; i < count; ++i) {
                 const int v = mirrored ? 2 - i % 3 : i % 3;
-                const int place = place_of(pattern.triangles[static_cast<std::size_t>(i / 3)]
-                                                            [static_cast<std::size_t>(v)]);
+                const int place =
+                    place_of(pattern.triangles[static_cast<std::size_t>(i / 3)][static_cast<std::size_t>(v)]);
                 (i < 16 ? first_ : more_)[p].place[i & 15] = static_cast<std::uint8_t>(place);
             }
         }
@@ -184,9 +184,11 @@ class Extraction {
                         static_cast<int>(full));
         for (std::size_t i = 0; i < n; ++i) {
             cell::PatternId& pattern = patterns[tests[i].open.item];
-            if (tests[i].change && (pattern & cell::unsettled)) pattern = tunnels(tests[i].open)[tests[i].diagonal];
+            if (tests[i].change && (pattern & cell::unsettled))
+                pattern = tunnels(tests[i].open)[tests[i].diagonal];
         }
-        for (int i = 0; i < count; ++i) patterns[open[i].item] &= static_cast<cell::PatternId>(~cell::unsettled);
+        for (int i = 0; i < count; ++i)
+            patterns[open[i].item] &= static_cast<cell::PatternId>(~cell::unsettled);
     }
 
     std::pair<std::uint64_t, std::uint64_t> number() {
@@ -209,8 +211,8 @@ class Extraction {
         BlockSamples samples;
         cell::VertexNumbers numbers;
         std::size_t block = 0;
-        std::uint64_t extra = 0;           // the next vertex inside a cell
-        const float* end_of_points;        // of the task: what follows is another's
+        std::uint64_t extra = 0;     // the next vertex inside a cell
+        const float* end_of_points;  // of the task: what follows is another's
         std::uint32_t* end_of_triangles;
     };
 
@@ -222,8 +224,12 @@ class Extraction {
             mesh_.points.data()->data() + 3 * (last ? mesh_.points.size() : cells_[end].first_vertex);
         filling.end_of_triangles =
             mesh_.triangles.data()->data() + 3 * (last ? mesh_.triangles.size() : cells_[end].first_triangle);
-        fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
-        fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
+        // Smaller arrays may come from memory that the process has used before.
+        constexpr std::size_t large = std::size_t{32} << 20;
+        if (mesh_.points.size() * sizeof(Vec3f) >= large)
+            fault_in(mesh_.points.data() + cells_[begin].first_vertex, filling.end_of_points);
+        if (mesh_.triangles.size() * sizeof(Triangle) >= large)
+            fault_in(mesh_.triangles.data() + cells_[begin].first_triangle, filling.end_of_triangles);
         const cell::PatternId* patterns = patterns_[begin / chunk].data();
         for (std::size_t b = begin; b < end; ++b) {
             filling.block = b;
@@ -294,14 +300,14 @@ class Extraction {
         }
         const BlockCells& cells = cells_[filling.block];
         filling.extra = cells.first_vertex + cells.edge_vertices;
-        kernels_.draw({cells.active, patterns, &filling.numbers, table_.drawing(),
-                       (mesh_.triangles.data() + cells.first_triangle)->data(), filling.end_of_triangles,
-                       [](void* context, int x, int y, int z, int pattern, std::uint32_t* numbers,
-                          std::uint32_t* out) {
-                           auto& f = *static_cast<Filling*>(context);
-                           f.extraction->draw_special(f, x, y, z, pattern, numbers, out);
-                       },
-                       &filling});
+        kernels_.draw(
+            {cells.active, patterns, &filling.numbers, table_.drawing(),
+             (mesh_.triangles.data() + cells.first_triangle)->data(), filling.end_of_triangles,
+             [](void* context, int x, int y, int z, int pattern, std::uint32_t* numbers, std::uint32_t* out) {
+                 auto& f = *static_cast<Filling*>(context);
+                 f.extraction->draw_special(f, x, y, z, pattern, numbers, out);
+             },
+             &filling});
     }
 
     /// A cell with vertices inside.
@@ -326,8 +332,7 @@ class Extraction {
         for (std::size_t k = 0; k < p.centre_count; ++k) {
             if (around != p.around_edges[k]) around_mean = mean(around = p.around_edges[k]);
             const Vec3d centre = p.centre_edges[k] == around ? around_mean : mean(p.centre_edges[k]);
-            mesh_.points[filling.extra] =
-                world(blocks_.origin(filling.block), 0.5 * (centre + around_mean));
+            mesh_.points[filling.extra] = world(blocks_.origin(filling.block), 0.5 * (centre + around_mean));
             numbers[DrawingTable::place_of(cell::edges + static_cast<int>(k))] =
                 static_cast<VertexId>(filling.extra++);
         }

@@ -140,7 +140,8 @@ class Scanner {
                 integers(values("offsets", offset_type, 1, count), count);
             if (word() != "CONNECTIVITY") fail("expected CONNECTIVITY");
             const VtkType corner_type = type(word());
-            piece_.sections[section].push_back(values("connectivity", corner_type, 1, size));
+            for (const std::int64_t v : integers(values("connectivity", corner_type, 1, size), size))
+                corners += fmt::format("{} ", v);
             cells = count > 0 ? count - 1 : 0;
             for (std::uint64_t i = 1; i < count; ++i) ends += fmt::format("{} ", offsets[i]);
         } else {
@@ -155,10 +156,10 @@ class Scanner {
                 for (std::uint64_t k = 0; k < n; ++k) corners += fmt::format("{} ", all[at++]);
                 ends += fmt::format("{} ", end += n);
             }
-            piece_.sections[section].push_back(
-                {"connectivity", {'i', 8}, 1, "ascii", 0, keep(std::move(corners))});
         }
         piece_.counts[counter] = cells;
+        piece_.sections[section].push_back(
+            {"connectivity", {'i', 8}, 1, "ascii", 0, keep(std::move(corners))});
         piece_.sections[section].push_back({"offsets", {'i', 8}, 1, "ascii", 0, keep(std::move(ends))});
     }
 

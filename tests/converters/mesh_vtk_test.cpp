@@ -330,22 +330,21 @@ TEST(MeshVtk, OldFilesOfText) {
     };
     EXPECT_EQ(with("ASCII", "ASCIJ"), "expected ASCII or BINARY, found 'ASCIJ'");
     EXPECT_EQ(with("POLYDATA", "STRUCTURED_GRID"), "expected DATASET POLYDATA: only surfaces are read");
-    EXPECT_EQ(with("POINTS 4", "POINTS 400"), "the file ends at value 92 of 1200");
+    EXPECT_EQ(with("POINTS 4", "POINTS 400"), "the file ends at value 63 of 1200");
     EXPECT_EQ(with("POINTS 4", "POINTS 9999999999999"), "expected a count, found '9999999999999'");
     EXPECT_EQ(with("4 0 1 2 3", "5 0 1 2 3"), "Polys: cell 0 reaches beyond the 5 values");
     EXPECT_EQ(with("4 0 1 2 3", "4 0 1 2 4"), "cell 0 names point 4 of 4");
     EXPECT_EQ(with("LINES", "LINED"), "'LINED' is not read here");
     EXPECT_EQ(with("id int", "id quaternion"), "expected a type such as float or int, found 'quaternion'");
-    EXPECT_EQ(with("ASCII", "BINARY"), "expected a count, found '1 0 0 1 0'");
+    EXPECT_EQ(with("ASCII", "BINARY"), "'1' is not read here");
 }
 
 TEST(MeshVtk, RealOldFiles) {
-    for (const auto& [name, points] :
-         {std::pair("smooth_sphere_r10", 0), std::pair("smooth_torus_rr25_csr10", 2401)}) {
+    for (const char* name : {"smooth_sphere_r10", "smooth_torus_rr25_csr10"}) {
         const std::string file = std::string("pycurv_curvature/") + name + ".surface.vtk";
         VDBGEO_NEEDS_DATA(file);
         const TriMesh mesh = read_mesh(data_folder() / file);
-        if (points > 0) EXPECT_GT(mesh.points.size(), 1000u);
+        EXPECT_GT(mesh.points.size(), 1000u);
         EXPECT_GT(mesh.triangles.size(), 1000u);
     }
 }

@@ -79,7 +79,7 @@ Command remesh_command() {
             o->files.add(app, true);
             app.add_option("--method", o->method,
                            "isotropic (split, collapse, flip, relax) or delaunay (needs a closed mesh)")
-                ->check(CLI::IsMember({"isotropic", "delaunay"}))
+                ->check(CLI::IsMember({"isotropic", "delaunay"}).description(""))
                 ->capture_default_str();
             app.add_option("--length", o->isotropic.target_length,
                            "isotropic: length of the edges, in Å [mean edge of the input]");

@@ -42,7 +42,7 @@ Command smooth_command() {
             o->files.add(app, true);
             app.add_option("--method", o->method,
                            "taubin (fast) or diffusion (the flow x_t = -Lap(2H) n, keeps the volume)")
-                ->check(CLI::IsMember({"taubin", "diffusion"}))
+                ->check(CLI::IsMember({"taubin", "diffusion"}).description(""))
                 ->capture_default_str();
             app.add_option("--iterations", o->taubin.iterations, "taubin: rounds, 0 for none")
                 ->capture_default_str();

@@ -104,7 +104,6 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
     Json rows = Json::array();
     for (const LabelSurface& s : surfaces) {
         const MeshMeasures m = measure_mesh(s.mesh);
-        if (m.faces == 0) throw NumericalError(fmt::format("{}: there is no label {}", o.in, s.label));
         rows.push_back({{"label", s.label},
                         {"components", m.components},
                         {"faces", m.faces},
@@ -130,8 +129,8 @@ void run_surface(const SurfaceOptions& o, Session& session) {
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     if (!o.labels.empty()) return run_labels(o, in, seconds, clock, session);
     const Surface surface = extract_surface(o.in, in, rule, session.stage("surface"), o.surface);
-    if (!session.json) session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text()));
     const TriMesh mesh = keep_pieces(surface.mesh, o, session);
+    if (!session.json) session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text()));
     finish(mesh, o, {{"iso", surface.isovalue}, {"iso_rule", rule.text()}, {"method", o.surface.method}},
            seconds, clock, session);
 }

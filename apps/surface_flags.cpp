@@ -65,7 +65,7 @@ void SurfaceFlags::add(CLI::App& app) {
     app.add_option("--method", method,
                    "marching-cubes (fast, exact topology), dual (smoother, adaptive) or delaunay (every "
                    "triangle well shaped)")
-        ->check(CLI::IsMember({"marching-cubes", "dual", "delaunay"}))
+        ->check(CLI::IsMember({"marching-cubes", "dual", "delaunay"}).description(""))
         ->capture_default_str();
     app.add_flag("--cap", cap, "marching-cubes: close the surface where it meets the border of the map");
     app.add_option("--adaptivity", dual.adaptivity,

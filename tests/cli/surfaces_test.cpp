@@ -84,10 +84,10 @@ TEST_F(Surfaces, CapsCloseWhatTheBorderCuts) {
 }
 
 TEST_F(Surfaces, IsovaluesByRules) {
-    const std::string map = phantom("a.mrc", 40);
-    const Json by_volume = json({"surface", map, at("v.ply"), "--iso", "volume:30000"});
-    EXPECT_NEAR(by_volume["volume_A3"].get<double>(), 30000, 0.05 * 30000);
-    const Json by_mass = json({"surface", map, at("m.ply"), "--iso", "mass:24.390244kDa"});
+    const std::string map = phantom("a.mrc", 40, {"--snr", "100", "--seed", "1"});
+    const Json by_volume = json({"surface", map, at("v.ply"), "--iso", "volume:2e6"});
+    EXPECT_NEAR(by_volume["volume_A3"].get<double>(), 2e6, 0.03 * 2e6);
+    const Json by_mass = json({"surface", map, at("m.ply"), "--iso", "mass:1.6260163MDa"});
     EXPECT_NEAR(by_mass["iso"].get<double>(), by_volume["iso"].get<double>(), 1e-3);
     json({"surface", map, at("o.ply"), "--iso", "otsu"});
     make("record.json",
@@ -156,7 +156,7 @@ TEST_F(Surfaces, LabelsBecomeSmoothClosedSurfaces) {
     expect_sound(j);
     EXPECT_NE(vdbgeo::read_mesh(at("l.ply")).find_face_property("label"), nullptr);
     EXPECT_EQ(json({"surface", at("labels.mrc"), at("m.ply"), "--labels", "3"})["labels"].size(), 1u);
-    expect_error(vdbgeo({"surface", at("labels.mrc"), at("x.ply"), "--labels", "7", "--quiet"}), 5,
+    expect_error(vdbgeo({"surface", at("labels.mrc"), at("x.ply"), "--labels", "7", "--quiet"}), 3,
                  at("labels.mrc"), "label 7");
     expect_error(vdbgeo({"surface", at("labels.mrc"), at("x.ply"), "--labels", "some"}), 2, "--labels");
     expect_error(vdbgeo({"surface", phantom("a.mrc", 24), at("x.ply"), "--labels", "all", "--quiet"}), 3,
@@ -265,6 +265,6 @@ TEST_F(Surfaces, DistanceBetweenTwoMeshes) {
     const Json j = json({"measure", a, "--distance", b});
     EXPECT_NEAR(j["hausdorff_A"].get<double>(), 1, 0.02);
     EXPECT_NEAR(j["distance_forward"]["rms_A"].get<double>(), 1, 0.02);
-    EXPECT_EQ(json({"measure", a, "--distance", a})["hausdorff_A"], 0);
+    EXPECT_LT(json({"measure", a, "--distance", a})["hausdorff_A"].get<double>(), 1e-9);
     expect_error(vdbgeo({"measure", a, b, "--distance", b}), 2, "--distance");
 }

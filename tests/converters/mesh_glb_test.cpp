@@ -289,8 +289,7 @@ TEST(MeshGlb, DamageIsRefusedByName) {
                                                             std::to_string(good.size()) + " bytes, found " +
                                                             std::to_string(good.size() - 1));
     EXPECT_EQ(refusal(with(16, "XXXX")), "byte 16: the first chunk is not the JSON");
-    EXPECT_EQ(refusal(with(12, little(0xFFFFFFFF))).substr(0, 37),
-              "byte 12: a chunk of 4294967295 bytes,");
+    EXPECT_EQ(refusal(with(12, little(0xFFFFFFFF))).substr(0, 37), "byte 12: a chunk of 4294967295 bytes,");
     EXPECT_EQ(refusal(with(20, "x")), "byte 21: the JSON is damaged");
     EXPECT_EQ(refusal_of([](Json& j) { j["accessors"][0]["count"] = 1000000000000; }),
               "accessor 0: 1000000000000 values of 12 bytes, found 48 bytes");

@@ -13,11 +13,11 @@ struct Isovalue {
     enum class Rule {
         automatic,  ///< by the class of the grid: 0 for a level set, half the maximum for a fog volume, else
                     ///< mean + 3 rms over all samples of the map
-        value,   ///< `number`
-        sigma,   ///< mean + `number` · rms over all samples of the map
-        volume,  ///< the voxels at or above the level fill `number` Å³
-        mass,    ///< the same for a molecule of `number` Da: volume = A3_per_dalton · mass
-        otsu     ///< parts the samples in two classes that differ most (Otsu 1979)
+        value,      ///< `number`
+        sigma,      ///< mean + `number` · rms over all samples of the map
+        volume,     ///< the voxels at or above the level fill `number` Å³
+        mass,       ///< the same for a molecule of `number` Da: volume = A3_per_dalton · mass
+        otsu        ///< parts the samples in two classes that differ most (Otsu 1979)
     };
 
     /// Å³ that a dalton of protein takes: its density is 0.81 Da/Å³, 1.35 g/cm³.

@@ -44,14 +44,14 @@ void run_components(const ComponentsOptions& o, Session& session) {
     std::uint64_t cavities = 0;
     for (const MeshComponent& c : pieces.components) cavities += c.cavity();
     Json rows = Json::array();
+    std::vector<std::string> lines;
     for (const MeshComponent& c : pieces.components) {
         if (rows.size() == o.list) break;
-        if (!session.json) session.say(component_text(rows.size() + 1, c));
+        lines.push_back(component_text(rows.size() + 1, c));
         rows.push_back(component_json(c));
     }
     Json j{{"components", pieces.components.size()}, {"cavities", cavities}, {"listed", rows}};
-    if (!session.json)
-        session.say(fmt::format("{} pieces, {} of them walls of cavities{}", pieces.components.size(),
+    lines.push_back(fmt::format("{} pieces, {} of them walls of cavities{}", pieces.components.size(),
                                 cavities,
                                 pieces.components.size() > rows.size() ? "; the largest are listed" : ""));
     if (o.split)
@@ -59,6 +59,8 @@ void run_components(const ComponentsOptions& o, Session& session) {
     else if (!o.out.empty())
         write_mesh(mesh, o.out, {}, session.stage("writing"));
     session.end_stage();
+    if (!session.json)
+        for (const std::string& line : lines) session.say(line);
     session.result(j);
 }
 

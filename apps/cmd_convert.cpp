@@ -188,9 +188,9 @@ void run_convert(ConvertOptions o, Session& session) {
     o.in = o.files.front();
     o.out = o.files.back();
     const bool series = o.files.size() > 2 || o.all_volumes;
-    if (series && (is_mesh_ending(o.in) || o.out == "-"))
+    if (series && (is_mesh_input(o.in) || o.out == "-"))
         throw UsageError("a series is made of maps, as numbered files");
-    if (is_mesh_ending(o.in)) return convert_mesh(o, session);
+    if (is_mesh_input(o.in)) return convert_mesh(o, session);
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
     check_map_output(o.out, session);

@@ -35,7 +35,7 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
             if (it->first.rfind("mrc_", 0) == 0 || it->first.rfind("vdbgeo_history", 0) == 0)
                 metadata[it->first] = it->second->str();
         j["metadata"] = metadata;
-    } else if (is_mesh_ending(file)) {
+    } else if (is_mesh_input(file)) {
         j["kind"] = "mesh";
         const TriMesh mesh = read_mesh(file, progress.part(0, 0.3));
         j.update(measures_json(measure_mesh(mesh, progress.part(0.3, 0.6))));
@@ -87,7 +87,7 @@ void check_info(const InfoOptions& options) {
         throw UsageError("--plot draws the isovalues of one map");
     if (options.isovalues)
         for (const std::string& file : options.files)
-            if (file == "-" || is_mesh_ending(file))
+            if (file == "-" || is_mesh_input(file))
                 throw UsageError(fmt::format("{}: --isovalues is of maps and grids in files", file));
 }
 

@@ -48,18 +48,20 @@ void run_measure(const MeasureOptions& o, Session& session) {
     if (!o.distance.empty() && o.in.size() > 1) throw UsageError("--distance is that of one mesh to another");
     Json all = Json::array();
     std::vector<std::pair<std::string, MeshMeasures>> meshes;
+    std::vector<std::string> lines;
     for (const std::string& file : o.in) {
         meshes.emplace_back(std::filesystem::path(file).filename().string(), MeshMeasures{});
         all.push_back(measure_one(file, o, meshes.back().second, session));
-        if (session.json) continue;
-        if (o.in.size() > 1) session.say(file + ":");
-        for (const std::string& line : measures_text(meshes.back().second)) session.say(line);
+        if (o.in.size() > 1) lines.push_back(file + ":");
+        for (const std::string& line : measures_text(meshes.back().second)) lines.push_back(line);
         if (!o.distance.empty())
-            session.say(fmt::format("distance    {:.4g} Å at most (Hausdorff)",
-                                    all.back()["hausdorff_A"].get<double>()));
-        if (file != o.in.back()) session.say("");
+            lines.push_back(fmt::format("distance    {:.4g} Å at most (Hausdorff)",
+                                        all.back()["hausdorff_A"].get<double>()));
+        if (file != o.in.back()) lines.emplace_back();
     }
     if (!o.histogram.empty()) write_angle_histograms(meshes, o.histogram);
+    if (!session.json)
+        for (const std::string& line : lines) session.say(line);
     session.result(all.size() == 1 ? all[0] : Json{{"files", all}});
 }
 

@@ -18,7 +18,7 @@ struct RenderCommandOptions {
 };
 
 TriMesh load(const RenderCommandOptions& o, const Isovalue& rule, Session& session) {
-    if (is_mesh_ending(o.in)) return read_mesh(o.in, session.stage("reading"));
+    if (is_mesh_input(o.in)) return read_mesh(o.in, session.stage("reading"));
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     return extract_surface(o.in, in, rule, session.stage("surface")).mesh;

@@ -62,8 +62,9 @@ void write_surface(const TriMesh& mesh, const SurfaceOptions& o, Json& j, Sessio
     session.end_stage();
 }
 
-void finish(const TriMesh& mesh, const SurfaceOptions& o, Json head, Json seconds, Clock& clock,
-            Session& session) {
+/// What is said comes when the file is there.
+void finish(const TriMesh& mesh, const SurfaceOptions& o, const Json& head,
+            const std::vector<std::string>& lines, Json seconds, Clock& clock, Session& session) {
     const MeshMeasures measures = measure_mesh(mesh, session.stage("measuring"));
     seconds["compute"] = clock.lap();
     Json j = measures_json(measures);
@@ -71,8 +72,10 @@ void finish(const TriMesh& mesh, const SurfaceOptions& o, Json head, Json second
     write_surface(mesh, o, j, session);
     seconds["write"] = clock.lap();
     j["seconds"] = seconds;
-    if (!session.json)
+    if (!session.json) {
+        for (const std::string& line : lines) session.say(line);
         for (const std::string& line : measures_text(measures)) session.say(line);
+    }
     say_where_open(measures, session);
     session.result(j);
 }
@@ -102,6 +105,7 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
     const auto surfaces =
         naming(o.in, [&] { return label_surfaces(in.map, options, session.stage("surfaces")); });
     Json rows = Json::array();
+    std::vector<std::string> lines;
     for (const LabelSurface& s : surfaces) {
         const MeshMeasures m = measure_mesh(s.mesh);
         rows.push_back({{"label", s.label},
@@ -109,14 +113,13 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
                         {"faces", m.faces},
                         {"area_A2", m.area_A2},
                         {"volume_A3", m.volume_A3 ? Json(*m.volume_A3) : Json()}});
-        if (!session.json)
-            session.say(fmt::format("label {:<5} {:>7} pieces {:>9} faces, {:.6g} Å², {}", s.label,
+        lines.push_back(fmt::format("label {:<5} {:>7} pieces {:>9} faces, {:.6g} Å², {}", s.label,
                                     m.components, m.faces, m.area_A2,
                                     m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "open"));
     }
     if (surfaces.empty()) throw NumericalError(fmt::format("{}: there is no label but 0", o.in));
     const TriMesh mesh = keep_pieces(join_labels(surfaces), o, session);
-    finish(mesh, o, {{"method", "labels"}, {"labels", rows}}, seconds, clock, session);
+    finish(mesh, o, {{"method", "labels"}, {"labels", rows}}, lines, seconds, clock, session);
 }
 
 void run_surface(const SurfaceOptions& o, Session& session) {
@@ -130,9 +133,8 @@ void run_surface(const SurfaceOptions& o, Session& session) {
     if (!o.labels.empty()) return run_labels(o, in, seconds, clock, session);
     const Surface surface = extract_surface(o.in, in, rule, session.stage("surface"), o.surface);
     const TriMesh mesh = keep_pieces(surface.mesh, o, session);
-    if (!session.json) session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text()));
     finish(mesh, o, {{"iso", surface.isovalue}, {"iso_rule", rule.text()}, {"method", o.surface.method}},
-           seconds, clock, session);
+           {fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text())}, seconds, clock, session);
 }
 
 }  // namespace

@@ -25,11 +25,17 @@ constexpr Format formats[] = {{".ply", read_ply, write_ply},     {".obj", read_o
                               {".vtp", read_vtk_xml, write_vtp}, {".vtu", read_vtk_xml, write_vtu},
                               {".glb", read_glb, write_glb}};
 
-/// The format that the name tells, nullptr for none.
-const Format* format_of(const std::filesystem::path& path) {
+/// The name's ending in lower case.
+std::string ending_of(const std::filesystem::path& path) {
     std::string ending = path.extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return ending;
+}
+
+/// The format that the name tells, nullptr for none.
+const Format* format_of(const std::filesystem::path& path) {
+    const std::string ending = ending_of(path);
     for (const Format& format : formats)
         if (ending == format.ending) return &format;
     return nullptr;
@@ -111,5 +117,9 @@ std::vector<std::string> mesh_endings() {
 std::string mesh_endings_text() { return fmt::format("{}", fmt::join(mesh_endings(), " ")); }
 
 bool is_mesh_ending(const std::filesystem::path& path) { return format_of(path) != nullptr; }
+
+bool is_mesh_input(const std::filesystem::path& path) {
+    return is_mesh_ending(path) || ending_of(path) == ".vtk";
+}
 
 }  // namespace vdbgeo

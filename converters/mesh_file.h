@@ -93,4 +93,7 @@ std::string mesh_endings_text();
 /// Whether the name has one of these endings, in upper or lower case.
 bool is_mesh_ending(const std::filesystem::path& path);
 
+/// Whether the name is that of a mesh to read: one of these endings, or .vtk.
+bool is_mesh_input(const std::filesystem::path& path);
+
 }  // namespace vdbgeo

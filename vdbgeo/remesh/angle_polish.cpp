@@ -40,11 +40,13 @@ class Polish {
  public:
     Polish(RemeshState& state, double least_deg) : state_(state), goal_(std::cos(least_deg * M_PI / 180)) {}
 
-    /// Works on every face worse than the goal once; how many changes that took.
-    std::size_t pass() {
+    /// Works on every face worse than the goal once; how many changes that took. Dust is split in the first
+    /// pass alone, and left after three: there may be a million pieces of it, and most can be made no better.
+    std::size_t pass(int number) {
+        pass_ = number;
         std::vector<std::pair<double, int>> bad;
         for (int f = 0; f < static_cast<int>(mesh().n_faces()); ++f)
-            if (const double c = cosine(FaceHandle(f)); c > goal_ && is_free(FaceHandle(f)))
+            if (const double c = cosine(FaceHandle(f)); c > goal_ && (number < 3 || !is_dust(FaceHandle(f))))
                 bad.emplace_back(-c, f);
         std::sort(bad.begin(), bad.end());
         std::size_t changes = 0;
@@ -71,8 +73,8 @@ class Polish {
         return least_angle_cosine(point(mesh().from_vertex_handle(h)), point(mesh().to_vertex_handle(h)),
                                   apex(h));
     }
-    bool is_free(FaceHandle f) {
-        return state_.site(mesh().to_vertex_handle(mesh().halfedge_handle(f))).length > 0;
+    bool is_dust(FaceHandle f) {
+        return state_.site(mesh().to_vertex_handle(mesh().halfedge_handle(f))).dust;
     }
     const Vec3d& apex(HalfedgeHandle h) {
         return point(mesh().to_vertex_handle(mesh().next_halfedge_handle(h)));
@@ -152,9 +154,9 @@ class Polish {
             mesh().valence(mesh().to_vertex_handle(h)) <= 3)
             return;
         const double before = std::max(least_angle_cosine(a, b, c), least_angle_cosine(b, a, d));
-        keep_better(
-            {Change::flip, h, {}, {}, std::max(least_angle_cosine(c, d, b), least_angle_cosine(d, c, a))},
-            before, best);
+        keep_better({Change::flip, h, VertexHandle(), Landing{},
+                     std::max(least_angle_cosine(c, d, b), least_angle_cosine(d, c, a))},
+                    before, best);
     }
     void try_collapse(HalfedgeHandle h, Change& best) {
         if (state_.site(mesh().from_vertex_handle(h)).kind > state_.site(mesh().to_vertex_handle(h)).kind)
@@ -203,7 +205,7 @@ class Polish {
         for (const HalfedgeHandle h : sides)
             if (best.after > goal_) try_collapse(h, best);
         for (const HalfedgeHandle h : sides)
-            if (best.after > goal_) try_split(h, best);
+            if (best.after > goal_ && (pass_ == 0 || !is_dust(f))) try_split(h, best);
         return apply(best);
     }
     bool apply(const Change& change) {
@@ -229,13 +231,14 @@ class Polish {
 
     RemeshState& state_;
     double goal_;
+    int pass_ = 0;
 };
 
 }  // namespace
 
 void polish_angles(RemeshState& state, double least_deg) {
     Polish polish(state, least_deg);
-    for (int pass = 0; pass < 10 && polish.pass() > 0; ++pass) {
+    for (int pass = 0; pass < 10 && polish.pass(pass) > 0; ++pass) {
     }
 }
 

@@ -17,8 +17,8 @@ namespace {
 
 /// Angles that the last step still works on.
 constexpr double least_angle_deg = 33;
-/// Pieces of no more faces are too coarse to be made over.
-constexpr std::uint64_t dust_faces = 24;
+/// Pieces of no more faces are too coarse to be made over: they would shrink.
+constexpr std::uint64_t dust_faces = 32;
 
 void check_positive(double value, const char* name) {
     if (!(std::isfinite(value) && value > 0))
@@ -73,9 +73,9 @@ std::vector<std::uint32_t> pieces_of_vertices(const TriMesh& mesh, const FaceAdj
     return piece;
 }
 
-/// Small pieces get shorter edges, so that some 25 faces are left of each, but none shorter than theirs are;
-/// those of a few faces, the dust of a voxel or two, stay as they are: their length is 0. `lengths`: one for
-/// each vertex, or one for all where all are the same.
+/// Small pieces get shorter edges, so that some 25 faces are left of each, but none shorter than theirs are.
+/// Those of a few faces, the dust of a voxel or two, are only polished: their lengths are negative.
+/// `lengths`: one for each vertex, or one for all where all are the same.
 void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vector<float>& lengths) {
     std::uint32_t count = 0;
     const std::vector<std::uint32_t> piece = pieces_of_vertices(mesh, adjacency, count);
@@ -90,7 +90,7 @@ void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vec
     }
     for (std::size_t v = 0; v < lengths.size(); ++v) {
         const std::uint32_t i = piece[v];
-        if (most[i] < lengths[v]) lengths[v] = sizes[i].faces <= dust_faces ? 0 : most[i];
+        if (most[i] < lengths[v]) lengths[v] = sizes[i].faces <= dust_faces ? -most[i] : most[i];
     }
 }
 
@@ -154,7 +154,6 @@ TriMesh isotropic_remesh(const TriMesh& mesh, const IsotropicRemeshOptions& opti
         progress.report(0.1 + 0.7 * (i + 1) / options.iterations);
     }
     state.flip_for_angles();
-    if (getenv("NOPOLISH")) return state.result();
     polish_angles(state, least_angle_deg);
     progress.report(1);
     return state.result();

@@ -27,16 +27,16 @@ RemeshState::RemeshState(const InputSurface& input, const std::vector<float>& le
     for (VertexId v = 0; v < mesh_.n_vertices(); ++v) {
         const std::uint32_t h = adjacency.outgoing[v];
         VertexSite& s = site(VertexHandle(static_cast<int>(v)));
-        s.length = lengths.size() == 1 ? lengths[0] : lengths[v];
-        s.kind = s.length > 0 ? input.kind(v) : Kind::corner;
+        const float length = lengths.size() == 1 ? lengths[0] : lengths[v];
+        s.length = std::abs(length);
+        s.dust = length < 0;
+        s.kind = input.kind(v);
         if (h != none) s.place = s.kind == Kind::line ? input.segment_at(v) : h / 3;
     }
     int e = 0;
     for (std::uint32_t h = 0; h < adjacency.twin.size(); ++h)  // edges are numbered by their first half-edges
         if (adjacency.twin[h] > h) {
-            const EdgeHandle edge(e++);
-            const bool fixed = !(site(mesh_.from_vertex_handle(mesh_.halfedge_handle(edge, 0))).length > 0);
-            mesh_.property(lines_, edge) = fixed ? h : input.segment(h);
+            mesh_.property(lines_, EdgeHandle(e++)) = input.segment(h);
         }
     const MeshProperty* cap = input.mesh().find_face_property(cap_property);
     if (cap && cap->components != 1) cap = nullptr;
@@ -47,8 +47,8 @@ RemeshState::RemeshState(const InputSurface& input, const std::vector<float>& le
 void RemeshState::set_interpolated_length(VertexSite& s, const Vec3d& weights) const {
     if (lengths_.size() == 1) return;
     const Triangle& t = input_.mesh().triangles[s.kind == Kind::line ? s.place / 3 : s.place];
-    s.length = static_cast<float>(weights[0] * lengths_[t[0]] + weights[1] * lengths_[t[1]] +
-                                  weights[2] * lengths_[t[2]]);
+    s.length = static_cast<float>(std::abs(weights[0] * lengths_[t[0]] + weights[1] * lengths_[t[1]] +
+                                           weights[2] * lengths_[t[2]]));
 }
 
 RemeshState::Landing RemeshState::land(const Vec3d& p, const VertexSite& start) const {
@@ -115,7 +115,7 @@ void RemeshState::split_long(double factor) {
             const HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
             const VertexHandle a = mesh_.from_vertex_handle(h), b = mesh_.to_vertex_handle(h);
             const double limit = factor * length(a, b), squared = (point(a) - point(b)).squaredNorm();
-            if (!(limit > 0) || squared <= limit * limit) break;
+            if (site(a).dust || squared <= limit * limit) break;
             const Landing at = split_landing(e);
             // A walk that ends far from the middle has lost its way (the sheet folds between the ends): the
             // edges that come would be no shorter, without end.
@@ -190,7 +190,7 @@ void RemeshState::collapse_short(double factor, double limit) {
         HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
         const VertexHandle a = mesh_.from_vertex_handle(h), b = mesh_.to_vertex_handle(h);
         const double least = factor * length(a, b);
-        if ((point(a) - point(b)).squaredNorm() >= least * least) continue;
+        if (site(a).dust || (point(a) - point(b)).squaredNorm() >= least * least) continue;
         if (site(a).kind > site(b).kind) h = mesh_.opposite_halfedge_handle(h);
         if (!can_collapse(h)) continue;
         const Landing at = collapse_landing(h);
@@ -209,6 +209,12 @@ bool RemeshState::flip_keeps_side(EdgeHandle e) const {
     return looks_along(area_vector(c, d, b), before) && looks_along(area_vector(d, c, a), before);
 }
 
+/// Not to be flipped: gone, on a line, or of a piece that is only polished.
+bool RemeshState::is_settled(EdgeHandle e) const {
+    return mesh_.status(e).deleted() || is_line(e) ||
+           site(mesh_.from_vertex_handle(mesh_.halfedge_handle(e, 0))).dust;
+}
+
 int RemeshState::valence_gain(EdgeHandle e) const {
     const HalfedgeHandle h = mesh_.halfedge_handle(e, 0), o = mesh_.opposite_halfedge_handle(h);
     const auto off = [&](VertexHandle v, int change) {
@@ -223,7 +229,7 @@ int RemeshState::valence_gain(EdgeHandle e) const {
 void RemeshState::flip_for_valence() {
     for (int i = 0; i < static_cast<int>(mesh_.n_edges()); ++i) {
         const EdgeHandle e(i);
-        if (mesh_.status(e).deleted() || is_line(e) || mesh_.is_boundary(e)) continue;
+        if (is_settled(e)) continue;
         if (valence_gain(e) > 0 && flip_keeps_side(e) && mesh_.is_flip_ok(e)) mesh_.flip(e);
     }
 }
@@ -231,7 +237,7 @@ void RemeshState::flip_for_valence() {
 void RemeshState::flip_for_angles() {
     for (int i = 0; i < static_cast<int>(mesh_.n_edges()); ++i) {
         const EdgeHandle e(i);
-        if (mesh_.status(e).deleted() || is_line(e) || mesh_.is_boundary(e)) continue;
+        if (is_settled(e)) continue;
         const HalfedgeHandle h = mesh_.halfedge_handle(e, 0), o = mesh_.opposite_halfedge_handle(h);
         const VertexHandle va = mesh_.from_vertex_handle(h), vb = mesh_.to_vertex_handle(h);
         const Vec3d &a = point(va), &b = point(vb),
@@ -283,7 +289,8 @@ void RemeshState::relax(double step) {
     parallel_for(count, grain, [&](std::size_t i) {
         const VertexHandle v(static_cast<int>(i));
         places[i] = {point(v), site(v)};
-        if (mesh_.status(v).deleted() || mesh_.is_isolated(v) || site(v).kind == Kind::corner) return;
+        if (mesh_.status(v).deleted() || mesh_.is_isolated(v) || site(v).kind == Kind::corner || site(v).dust)
+            return;
         const Landing at = land(relaxed(v, step), site(v));
         // A walk that ends far off has lost its way.
         if ((at.point - point(v)).norm() < site(v).length) places[i] = at;

@@ -26,7 +26,8 @@ inline double least_angle_cosine(const Vec3d& p, const Vec3d& q, const Vec3d& r)
 /// Where a vertex of the remeshed surface lies on the input.
 struct VertexSite {
     std::uint32_t place = 0;  ///< the input's face; for those on lines the segment
-    float length = 0;         ///< Å, that edges here should have; 0: nothing changes here
+    float length = 0;         ///< Å, that edges here should have
+    bool dust = false;        ///< of a piece that is only polished
     InputSurface::Kind kind = InputSurface::Kind::free;
 };
 
@@ -41,7 +42,7 @@ class RemeshState {
     using Kind = InputSurface::Kind;
     static constexpr std::uint32_t none = FaceAdjacency::none;
 
-    /// `lengths`: one for each vertex of the input, or one for all; pieces of length 0 stay as they are.
+    /// `lengths`: one for each vertex of the input, or one for all; negative: the piece is only polished.
     RemeshState(const InputSurface& input, const std::vector<float>& lengths);
 
     /// Splits every edge longer than `factor` times its length.
@@ -94,6 +95,7 @@ class RemeshState {
  private:
     bool collapse_keeps_shape(HalfedgeHandle h, const Landing& at, double limit);
     bool ring_keeps_shape(VertexHandle v, VertexHandle other, const Landing& at, double limit) const;
+    bool is_settled(EdgeHandle e) const;
     int valence_gain(EdgeHandle e) const;
     Vec3d relaxed(VertexHandle v, double step) const;
     void set_interpolated_length(VertexSite& site, const Vec3d& weights) const;

@@ -73,9 +73,9 @@ std::vector<std::uint32_t> pieces_of_vertices(const TriMesh& mesh, const FaceAdj
     return piece;
 }
 
-/// Small pieces get shorter edges, so that some 60 faces are left of each: fewer would take away most of its area. Of
-/// needles and flakes that would make very many; those are only polished, which a negative length says. `lengths`: one
-/// for each vertex, or one for all where all are the same.
+/// Small pieces get shorter edges, so that some 60 faces are left of each: fewer would take away most of its
+/// area. Of needles and flakes that would make very many; those are only polished, which a negative length
+/// says. `lengths`: one for each vertex, or one for all where all are the same.
 void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vector<float>& lengths) {
     std::uint32_t count = 0;
     const std::vector<std::uint32_t> piece = pieces_of_vertices(mesh, adjacency, count);
@@ -89,7 +89,8 @@ void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vec
     }
     for (std::size_t v = 0; v < lengths.size(); ++v) {
         const std::uint32_t i = piece[v];
-        if (most[i] < lengths[v]) lengths[v] = most[i] < needle_share * sizes[i].mean_edge() ? -most[i] : most[i];
+        if (most[i] < lengths[v])
+            lengths[v] = most[i] < needle_share * sizes[i].mean_edge() ? -most[i] : most[i];
     }
 }
 

@@ -254,7 +254,9 @@ TEST(IsotropicRemesh, VertexAndFacePropertiesComeFromTheInput) {
     for (std::size_t f = 0; f < out.triangles.size(); ++f) {
         const Triangle& t = out.triangles[f];
         const double z = (corner(out, t, 0).z() + corner(out, t, 1).z() + corner(out, t, 2).z()) / 3;
-        if (std::abs(z) > 1) EXPECT_EQ(side->values[f], z > 0 ? 7 : 3);
+        if (std::abs(z) > 1) {
+            EXPECT_EQ(side->values[f], z > 0 ? 7 : 3);
+        }
     }
 }
 

@@ -1,3 +1,8 @@
+// OpenMesh grows its arrays by default-made elements, and Eigen's vectors leave those unset.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+
 #include "vdbgeo/remesh/half_edge_mesh.h"
 
 namespace vdbgeo {

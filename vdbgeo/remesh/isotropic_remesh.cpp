@@ -17,8 +17,8 @@ namespace {
 
 /// Angles that the last step still works on.
 constexpr double least_angle_deg = 33;
-/// Pieces of no more faces are too coarse to be made over: they would shrink.
-constexpr std::uint64_t dust_faces = 32;
+/// A small piece whose edges are longer by this is a needle or a flake that no even triangles can be made of.
+constexpr double needle_share = 0.3;
 
 void check_positive(double value, const char* name) {
     if (!(std::isfinite(value) && value > 0))
@@ -73,24 +73,24 @@ std::vector<std::uint32_t> pieces_of_vertices(const TriMesh& mesh, const FaceAdj
     return piece;
 }
 
-/// Small pieces get shorter edges, so that some 25 faces are left of each, but none shorter than theirs are.
-/// Those of a few faces, the dust of a voxel or two, are only polished: their lengths are negative.
-/// `lengths`: one for each vertex, or one for all where all are the same.
+/// Small pieces get shorter edges, so that some 60 faces are left of each: fewer would take away most of its
+/// area. Of needles and flakes that would make very many; those are only polished, which a negative length
+/// says. `lengths`: one for each vertex, or one for all where all are the same.
 void fit_to_pieces(const TriMesh& mesh, const FaceAdjacency& adjacency, std::vector<float>& lengths) {
     std::uint32_t count = 0;
     const std::vector<std::uint32_t> piece = pieces_of_vertices(mesh, adjacency, count);
     std::vector<Size> sizes(count);
     for (const Triangle& t : mesh.triangles) sizes[piece[t[0]]].add(mesh, t);
     std::vector<float> most(count);
-    for (std::uint32_t i = 0; i < count; ++i)
-        most[i] = static_cast<float>(std::max(0.3 * std::sqrt(sizes[i].area), sizes[i].mean_edge()));
+    for (std::uint32_t i = 0; i < count; ++i) most[i] = static_cast<float>(0.2 * std::sqrt(sizes[i].area));
     if (lengths.size() == 1) {
         if (std::none_of(most.begin(), most.end(), [&](float m) { return m < lengths[0]; })) return;
         lengths.resize(mesh.points.size(), lengths[0]);
     }
     for (std::size_t v = 0; v < lengths.size(); ++v) {
         const std::uint32_t i = piece[v];
-        if (most[i] < lengths[v]) lengths[v] = sizes[i].faces <= dust_faces ? -most[i] : most[i];
+        if (most[i] < lengths[v])
+            lengths[v] = most[i] < needle_share * sizes[i].mean_edge() ? -most[i] : most[i];
     }
 }
 

@@ -47,8 +47,8 @@ RemeshState::RemeshState(const InputSurface& input, const std::vector<float>& le
 void RemeshState::set_interpolated_length(VertexSite& s, const Vec3d& weights) const {
     if (lengths_.size() == 1) return;
     const Triangle& t = input_.mesh().triangles[s.kind == Kind::line ? s.place / 3 : s.place];
-    s.length = static_cast<float>(std::abs(weights[0] * lengths_[t[0]] + weights[1] * lengths_[t[1]] +
-                                           weights[2] * lengths_[t[2]]));
+    s.length = static_cast<float>(
+        std::abs(weights[0] * lengths_[t[0]] + weights[1] * lengths_[t[1]] + weights[2] * lengths_[t[2]]));
 }
 
 RemeshState::Landing RemeshState::land(const Vec3d& p, const VertexSite& start) const {
@@ -107,20 +107,50 @@ void RemeshState::split(EdgeHandle e, const Landing& at) {
         if (side.is_valid()) mesh_.property(caps_, FaceHandle(faces++)) = mesh_.property(caps_, side);
 }
 
+/// Goes from an edge to a longer one of its faces until there is none: splitting that one makes no needles.
+RemeshState::EdgeHandle RemeshState::longest_near(EdgeHandle e) const {
+    double longest = squared_length(e);
+    for (bool longer = true; longer;) {
+        longer = false;
+        const EdgeHandle at = e;
+        for (const unsigned int k : {0u, 1u}) {
+            HalfedgeHandle h = mesh_.halfedge_handle(at, k);
+            if (mesh_.is_boundary(h)) continue;
+            for (int side = 0; side < 2; ++side) {
+                h = mesh_.next_halfedge_handle(h);
+                const double length = squared_length(mesh_.edge_handle(h));
+                if (length > longest) longest = length, e = mesh_.edge_handle(h), longer = true;
+            }
+        }
+    }
+    return e;
+}
+
+double RemeshState::squared_length(EdgeHandle e) const {
+    const HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
+    return (point(mesh_.from_vertex_handle(h)) - point(mesh_.to_vertex_handle(h))).squaredNorm();
+}
+
+bool RemeshState::is_long(EdgeHandle e, double factor) const {
+    const HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
+    const VertexHandle a = mesh_.from_vertex_handle(h), b = mesh_.to_vertex_handle(h);
+    const double limit = factor * length(a, b);
+    return !site(a).dust && squared_length(e) > limit * limit;
+}
+
 void RemeshState::split_long(double factor) {
     for (int i = 0; i < static_cast<int>(mesh_.n_edges()); ++i) {  // those that come are visited too
         const EdgeHandle e(i);
-        if (mesh_.status(e).deleted()) continue;
-        for (int times = 0; times < 64; ++times) {
-            const HalfedgeHandle h = mesh_.halfedge_handle(e, 0);
-            const VertexHandle a = mesh_.from_vertex_handle(h), b = mesh_.to_vertex_handle(h);
-            const double limit = factor * length(a, b), squared = (point(a) - point(b)).squaredNorm();
-            if (site(a).dust || squared <= limit * limit) break;
-            const Landing at = split_landing(e);
+        while (!mesh_.status(e).deleted() && is_long(e, factor)) {
+            const EdgeHandle longest = longest_near(e);
+            const HalfedgeHandle h = mesh_.halfedge_handle(longest, 0);
+            const Landing at = split_landing(longest);
+            const Vec3d middle =
+                0.5 * (point(mesh_.from_vertex_handle(h)) + point(mesh_.to_vertex_handle(h)));
             // A walk that ends far from the middle has lost its way (the sheet folds between the ends): the
             // edges that come would be no shorter, without end.
-            if ((at.point - 0.5 * (point(a) + point(b))).squaredNorm() > 0.0625 * squared) break;
-            split(e, at);
+            if ((at.point - middle).squaredNorm() > 0.0625 * squared_length(longest)) break;
+            split(longest, at);
         }
     }
 }

@@ -95,6 +95,9 @@ class RemeshState {
  private:
     bool collapse_keeps_shape(HalfedgeHandle h, const Landing& at, double limit);
     bool ring_keeps_shape(VertexHandle v, VertexHandle other, const Landing& at, double limit) const;
+    EdgeHandle longest_near(EdgeHandle e) const;
+    double squared_length(EdgeHandle e) const;
+    bool is_long(EdgeHandle e, double factor) const;
     bool is_settled(EdgeHandle e) const;
     int valence_gain(EdgeHandle e) const;
     Vec3d relaxed(VertexHandle v, double step) const;

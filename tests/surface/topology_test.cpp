@@ -149,7 +149,7 @@ MeshedCell describe(const TriMesh& mesh) {
         edge.push_back(edge_of(p));
         if (!edge.back() && (p.minCoeff() <= 0 || p.maxCoeff() >= 1)) out.defect = "vertex not inside";
     }
-    constexpr std::size_t most = 12 + 4;
+    constexpr std::size_t most = 12 + 6;
     if (n > most) return out.defect = "too many vertices", out;
     SmallSets<most> pieces({}), loops({});
     std::array<std::array<int, most>, most> runs{};  // how often triangles run from one vertex to another

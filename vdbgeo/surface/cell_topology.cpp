@@ -129,7 +129,7 @@ void add_disc(Pattern& p, const Loop& loop) {
     if (cost[0][n - 1] >= forbidden) {
         const int centre = edges + p.centre_count;
         for (int i = 0; i < n; ++i) add(p, loop[i], loop[(i + 1) % n], centre);
-        p.around_edges[p.centre_count] = p.centre_edges[p.centre_count] = mask_of(loop);
+        p.centre_edges[p.centre_count] = mask_of(loop);
         ++p.centre_count;
         return;
     }
@@ -145,108 +145,29 @@ void add_disc(Pattern& p, const Loop& loop) {
     }
 }
 
-/// A walk once around loop a forwards and once around loop b backwards, every step one triangle of the band
-/// between them: true for a step along a. It begins at the cross edge a[start_a] – b[start_b].
-struct Band {
-    std::vector<bool> along_a;
-    int start_a = 0, start_b = 0;
-};
-
-/// The walk with the shortest cross edges, by dynamic programming over the lattice of cross edges for every
-/// start. Returns its cost, `forbidden` or more where no walk does without a forbidden cross edge.
-template <class Cost>
-int find_band(const Loop& a, const Loop& b, const Cost& edge_cost, Band& band) {
-    const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
-    int best = std::numeric_limits<int>::max();
-    for (int start = 0; start < n * m; ++start) {
-        const int start_a = start % n, start_b = start / n;
-        std::vector<std::vector<int>> cost(n + 1, std::vector<int>(m + 1, 2 * forbidden));
-        std::vector<std::vector<bool>> from_a(n + 1, std::vector<bool>(m + 1, false));
-        cost[0][0] = 0;
-        // A walk begins along a and ends along b, and does not go around one loop at a stretch: it would come
-        // back to the same cross edge. So the lattice's side i = 0 and its corner (n, 0) are left out.
-        for (int i = 1; i <= n; ++i)
-            for (int j = 0; j <= m; ++j) {
-                if ((i == n && j == 0) || (i < n && j == m)) continue;
-                const int via_a = cost[i - 1][j], via_b = j > 0 ? cost[i][j - 1] : 2 * forbidden;
-                from_a[i][j] = via_a <= via_b;
-                const int step = edge_cost(a[(start_a + i) % n], b[(start_b - j + 2 * m) % m]);
-                cost[i][j] = std::min(2 * forbidden, std::min(via_a, via_b) + step);
-            }
-        if (cost[n][m] >= best) continue;
-        best = cost[n][m];
-        if (best >= forbidden) continue;
-        band = {{}, start_a, start_b};
-        for (int i = n, j = m; i + j > 0;) {
-            band.along_a.push_back(from_a[i][j]);
-            --(band.along_a.back() ? i : j);
-        }
-        std::reverse(band.along_a.begin(), band.along_a.end());
-    }
-    return best;
-}
-
-/// Three steps of the walk that part it so that neither loop lies in one part alone; the parts as even as may
-/// be.
-std::array<int, 3> part_in_three(const Band& band) {
-    const int steps = static_cast<int>(band.along_a.size());
-    std::array<int, 3> best{};
-    int longest = steps + 1;
-    for (int p = 0; p < steps; ++p)
-        for (int q = p + 1; q < steps; ++q)
-            for (int r = q + 1; r < steps; ++r) {
-                const std::array<int, 4> cut{p, q, r, p + steps};
-                int with_a = 0, with_b = 0, most = 0;
-                for (int k = 0; k < 3; ++k) {
-                    bool a = false, b = false;
-                    for (int s = cut[k]; s < cut[k + 1]; ++s) (band.along_a[s % steps] ? a : b) = true;
-                    with_a += a;
-                    with_b += b;
-                    most = std::max(most, cut[k + 1] - cut[k]);
-                }
-                if (with_a > 1 && with_b > 1 && most < longest) longest = most, best = {p, q, r};
-            }
-    return best;
-}
-
-/// The wall of a tunnel between two loops. Where every band has an edge inside a face of the cell, the cross
-/// edges run over a ring of three extra vertices. Each is drawn from the middle of the crossings that it is
-/// joined to, all of which may lie in one face, towards the middle of the tunnel: a vertex in a face could
-/// meet another of the neighbour cell.
+/// The wall of a tunnel between two loops, its triangles to be drawn for each cell. An edge inside a face of
+/// the cell is forbidden here too, so loops that share a face have a ring of extra vertices between them.
 void add_tunnel(Pattern& p, const Loop& a, const Loop& b) {
-    const int n = static_cast<int>(a.size()), m = static_cast<int>(b.size());
-    Band band;
-    const bool direct = find_band(a, b, diagonal_cost, band) < forbidden;
-    if (!direct) find_band(a, b, distance2, band);
-    int i = 0, j = 0;
-    const auto at_a = [&] { return a[(band.start_a + i) % n]; };
-    const auto at_b = [&] { return b[(band.start_b - j + 2 * m) % m]; };
-    const std::array<int, 3> cut = direct ? std::array<int, 3>{-1, -1, -1} : part_in_three(band);
-    const int ring = p.centre_count;
-    const auto add_to_centre = [&](int place) {
-        p.centre_edges[ring + place] |= static_cast<std::uint16_t>(1 << at_a() | 1 << at_b());
+    if (a.size() > b.size()) return add_tunnel(p, b, a);
+    Tunnel& t = p.tunnel;
+    const auto take = [&](int which, const Loop& loop) {
+        const auto k = static_cast<std::size_t>(which);
+        t.size[k] = static_cast<std::uint8_t>(loop.size());
+        std::copy(loop.begin(), loop.end(), t.loop[k].begin());
     };
-    int place = 2;  // the last ring vertex before the first cut
-    for (int s = 0; s < n + m; ++s) {
-        if (place < 2 ? s == cut[place + 1] : s == cut[0]) {
-            const int before = place;
-            place = (place + 1) % 3;
-            add_to_centre(place);
-            add(p, edges + ring + place, edges + ring + before, at_a());
-            add(p, edges + ring + before, edges + ring + place, at_b());
-        }
-        const int from_a = at_a(), from_b = at_b(), centre = edges + ring + place;
-        ++(band.along_a[s] ? i : j);
-        if (!direct) add_to_centre(place);
-        if (band.along_a[s])
-            add(p, from_a, at_a(), direct ? from_b : centre);
-        else
-            add(p, at_b(), from_b, direct ? from_a : centre);
+    take(0, a);
+    take(1, b);
+    for (const int e : a)
+        t.ring |= std::any_of(b.begin(), b.end(), [e](int f) { return share_a_face(e, f); });
+    t.first_centre = p.centre_count;
+    t.first_triangle = p.triangle_count;
+    std::size_t triangles = a.size() + b.size();
+    if (t.ring) {
+        triangles += 2 * a.size();
+        p.centre_count = static_cast<std::uint8_t>(p.centre_count + a.size());
     }
-    if (direct) return;
-    for (int k = ring; k < ring + 3; ++k)
-        p.around_edges[k] = static_cast<std::uint16_t>(mask_of(a) | mask_of(b));
-    p.centre_count += 3;
+    p.triangle_count = static_cast<std::uint8_t>(p.triangle_count + triangles);
+    if (p.triangle_count > max_triangles || p.centre_count > max_centres) std::abort();
 }
 
 /// Discs for all loops but the two that a tunnel joins (-1: none).

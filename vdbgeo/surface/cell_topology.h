@@ -20,15 +20,27 @@ constexpr int lower_corner(int e) {
 constexpr int upper_corner(int e) { return lower_corner(e) + (1 << (e / 4)); }
 
 /// Most triangles and extra vertices that a cell can need.
-constexpr int max_triangles = 24, max_centres = 4;
+constexpr int max_triangles = 24, max_centres = 6;
+
+/// A tunnel: the two loops that it joins, the shorter first. Where both have crossings in one face, a ring of
+/// extra vertices runs between them, one for each crossing of the first.
+struct Tunnel {
+    std::array<std::uint8_t, 2> size{};
+    std::array<std::array<std::uint8_t, edges>, 2> loop{};
+    bool ring = false;
+    std::uint8_t first_centre = 0, first_triangle = 0;
+};
 
 /// How to triangulate a cell: triples of vertices, 0…11 the crossing of that edge, 12 + k the k-th extra
-/// vertex inside the cell. That lies midway between the mean of the crossings in `centre_edges[k]` (a bit per
-/// edge) and the mean of those in `around_edges[k]`.
+/// vertex inside the cell. That is the mean of the crossings in `centre_edges[k]` (a bit per edge). A
+/// tunnel's triangles and extra vertices are counted, but depend on the crossings' places: cell_tunnel.h.
 struct Pattern {
     std::uint8_t triangle_count = 0, centre_count = 0;
-    std::array<std::uint16_t, max_centres> centre_edges{}, around_edges{};
+    std::array<std::uint16_t, max_centres> centre_edges{};
     std::array<std::array<std::uint8_t, 3>, max_triangles> triangles{};
+    Tunnel tunnel;
+
+    bool has_tunnel() const { return tunnel.size[0] > 0; }
 };
 
 /// Number of a pattern in the table; with the bit `unsettled` the one without a tunnel, where the corner

@@ -12,6 +12,7 @@
 #include "vdbgeo/surface/block_cells.h"
 #include "vdbgeo/surface/cell_kernels.h"
 #include "vdbgeo/surface/cell_topology.h"
+#include "vdbgeo/surface/cell_tunnel.h"
 #include "vdbgeo/surface/crossing_blocks.h"
 
 namespace vdbgeo {
@@ -32,7 +33,7 @@ class DrawingTable {
         for (std::size_t p = 0; p < patterns.size(); ++p) {
             const Pattern& pattern = patterns[p];
             const int count = 3 * pattern.triangle_count;
-            const bool special = pattern.centre_count > 0 || count > 32;
+            const bool special = pattern.centre_count > 0 || pattern.has_tunnel() || count > 32;
             corners_.push_back(static_cast<std::uint8_t>(special ? count + cell::Drawing::special : count));
             sizes_.push_back(pattern.triangle_count | static_cast<std::uint32_t>(pattern.centre_count) << 16);
             if (special) continue;
@@ -310,29 +311,33 @@ class Extraction {
              &filling});
     }
 
-    /// A cell with vertices inside.
+    /// A cell with vertices inside or a tunnel.
     void draw_special(Filling& filling, int x, int y, int z, int pattern, VertexId* numbers, VertexId* out) {
-        const Pattern& p = cell::pattern_table().patterns[static_cast<std::size_t>(pattern)];
-        unsigned all = 0;
-        for (std::size_t k = 0; k < p.centre_count; ++k) all |= p.centre_edges[k] | p.around_edges[k];
-        std::array<Vec3d, cell::edges> crossings;
-        for (unsigned left = all; left; left &= left - 1) {
-            const int e = __builtin_ctz(left);
-            crossings[static_cast<std::size_t>(e)] = crossing_on(filling.samples, x, y, z, e);
-        }
-        const auto mean = [&](unsigned edges) -> Vec3d {
+        Pattern p = cell::pattern_table().patterns[static_cast<std::size_t>(pattern)];
+        std::array<Vec3d, cell::edges> crossings;  // from the cell's lowest corner
+        const auto take_crossing = [&](int e) {
+            crossings[static_cast<std::size_t>(e)] =
+                crossing_on(filling.samples, x, y, z, e) - Vec3d(x, y, z);
+        };
+        std::array<Vec3d, cell::max_centres> centres;
+        for (std::size_t k = 0; k < p.centre_count; ++k) {
+            if (!p.centre_edges[k]) continue;
             Vec3d sum = Vec3d::Zero();
             int count = 0;
-            for (unsigned left = edges; left; left &= left - 1, ++count)
-                sum += crossings[static_cast<std::size_t>(__builtin_ctz(left))];
-            return sum / count;
-        };
-        unsigned around = 0;
-        Vec3d around_mean = Vec3d::Zero();
+            for (unsigned left = p.centre_edges[k]; left; left &= left - 1, ++count) {
+                const int e = __builtin_ctz(left);
+                take_crossing(e);
+                sum += crossings[static_cast<std::size_t>(e)];
+            }
+            centres[k] = sum / count;
+        }
+        if (p.has_tunnel()) {
+            for (std::size_t l = 0; l < 2; ++l)
+                for (std::size_t i = 0; i < p.tunnel.size[l]; ++i) take_crossing(p.tunnel.loop[l][i]);
+            cell::make_tunnel(p, crossings, centres);
+        }
         for (std::size_t k = 0; k < p.centre_count; ++k) {
-            if (around != p.around_edges[k]) around_mean = mean(around = p.around_edges[k]);
-            const Vec3d centre = p.centre_edges[k] == around ? around_mean : mean(p.centre_edges[k]);
-            mesh_.points[filling.extra] = world(blocks_.origin(filling.block), 0.5 * (centre + around_mean));
+            mesh_.points[filling.extra] = world(blocks_.origin(filling.block), Vec3d(x, y, z) + centres[k]);
             numbers[DrawingTable::place_of(cell::edges + static_cast<int>(k))] =
                 static_cast<VertexId>(filling.extra++);
         }

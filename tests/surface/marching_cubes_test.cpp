@@ -11,6 +11,7 @@
 #include "tests/support/maps.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/measure/self_intersections.h"
 
 using namespace vdbgeo;
 using namespace vdbgeo::test;
@@ -86,6 +87,16 @@ TEST(MarchingCubes, NoiseGivesAManifoldThatIsOpenAtTheBorderOnly) {
     }
     const MeshMeasures closed = measure_mesh(extract(map_from_values(Vec3i(n, n, n), values)));
     EXPECT_TRUE(closed.closed && closed.manifold && closed.oriented);
+}
+
+TEST(MarchingCubes, NoiseHasNoFacesThatCutEachOther) {
+    if (!have_self_intersections()) GTEST_SKIP() << "built without CGAL";
+    const int n = 12;
+    for (std::uint64_t seed = 1; seed <= 150; ++seed) {
+        const TriMesh mesh = extract(map_from_values(Vec3i(n, n, n), noise(n * n * n, seed)));
+        ASSERT_GT(mesh.triangles.size(), 4000u);
+        EXPECT_TRUE(self_intersections(mesh).empty()) << "seed " << seed;
+    }
 }
 
 TEST(MarchingCubes, SameBytesForAnyNumberOfThreads) {

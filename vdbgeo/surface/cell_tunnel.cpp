@@ -123,12 +123,27 @@ Polygon reversed(Polygon p) {
     return p;
 }
 
-/// Twice the view of the whole loop from the origin's side of the other: > 0 where the wall faces away.
+/// 1 where the wall between the loops faces away from the tunnel, −1 where it faces inwards.
 int facing(const Polygon& a, const Polygon& b) {
     const Vec3d towards = mean(b) - mean(a);
     double sum = 0;
     for (int i = 0; i < a.size; ++i) sum += a.place[a.wrap(i)].cross(a.place[a.wrap(i + 1)]).dot(towards);
     return sum >= 0 ? 1 : -1;
+}
+
+void move(Polygon& p, const Vec3d& by) {
+    for (int i = 0; i < p.size; ++i) p.place[static_cast<std::size_t>(i)] += by;
+}
+
+/// A vertex for each of a's, `part` of the way to b and from there half of the way to the origin: both ends
+/// may lie in one face of the cell, where it could meet one of the neighbour's.
+Polygon ring_between(const Polygon& a, const Polygon& b, double part, int first_vertex) {
+    Polygon ring;
+    for (int i = 0; i < a.size; ++i) {
+        const Vec3d& from = a.place[static_cast<std::size_t>(i)];
+        ring.add(first_vertex + i, 0.5 * (from + part * (nearest_on(b, from) - from)));
+    }
+    return ring;
 }
 
 }  // namespace
@@ -139,31 +154,38 @@ void make_tunnel(Pattern& pattern, const std::array<Vec3d, edges>& crossings,
     Polygon a, b;
     for (int i = 0; i < tunnel.size[0]; ++i) a.add(tunnel.loop[0][i], crossings[tunnel.loop[0][i]]);
     for (int i = 0; i < tunnel.size[1]; ++i) b.add(tunnel.loop[1][i], crossings[tunnel.loop[1][i]]);
-    const Vec3d middle = 0.5 * (mean(a) + mean(b));
-    for (int i = 0; i < a.size; ++i) a.place[static_cast<std::size_t>(i)] -= middle;
-    for (int i = 0; i < b.size; ++i) b.place[static_cast<std::size_t>(i)] -= middle;
+    const Vec3d mean_a = mean(a), mean_b = mean(b);
     const int sign = facing(a, b);
     std::size_t next = tunnel.first_triangle;
-    if (!tunnel.ring) return draw_band(find_band(a, b, sign), a, b, pattern, next);
+    if (!tunnel.ring) {
+        const Vec3d middle = 0.5 * (mean_a + mean_b);
+        move(a, -middle);
+        move(b, -middle);
+        return draw_band(find_band(a, b, sign), a, b, pattern, next);
+    }
 
     constexpr double enough = 0.02;
     double best = -3;
     Polygon ring;
     Band first, second;
-    for (const double part : {0.5, 0.25, 0.75, 0.125, 0.0625, 0.03125}) {
-        Polygon trial;
-        for (int i = 0; i < a.size; ++i) {
-            const Vec3d& from = a.place[static_cast<std::size_t>(i)];
-            // Inwards, since both ends may lie in one face of the cell: another there could be met.
-            trial.add(edges + tunnel.first_centre + i, 0.5 * (from + part * (nearest_on(b, from) - from)));
+    Vec3d middle = Vec3d::Zero(), now = middle;
+    for (const double along : {0.5, 0.25, 0.75, 0.1, 0.9, 0.02}) {
+        const Vec3d view_point = mean_a + along * (mean_b - mean_a);
+        move(a, now - view_point);
+        move(b, now - view_point);
+        now = view_point;
+        for (const double part : {0.5, 0.25, 0.75, 0.125, 0.0625, 0.03125}) {
+            const Polygon trial = ring_between(a, b, part, edges + tunnel.first_centre);
+            const Band to_ring = find_band(a, reversed(trial), sign), from_ring = find_band(trial, b, sign);
+            const double score = std::min(to_ring.score, from_ring.score);
+            if (score <= best) continue;
+            best = score;
+            ring = trial;
+            first = to_ring;
+            second = from_ring;
+            middle = view_point;
+            if (best > enough) break;
         }
-        const Band to_ring = find_band(a, reversed(trial), sign), from_ring = find_band(trial, b, sign);
-        const double score = std::min(to_ring.score, from_ring.score);
-        if (score <= best) continue;
-        best = score;
-        ring = trial;
-        first = to_ring;
-        second = from_ring;
         if (best > enough) break;
     }
     draw_band(first, a, reversed(ring), pattern, next);

@@ -24,8 +24,9 @@ struct DelaunayRemeshOptions {
 /// solid. Creases and corners sharper than the bounds are rounded off within them. Properties are not kept.
 ///
 /// Throws InvalidInput for an option out of range, for a mesh that is open, not consistently oriented or not
-/// a manifold, and where this build has no CGAL; NumericalError where a cap is reached or a component cannot
-/// be meshed; Cancelled. An empty mesh gives an empty mesh. Cost: about 0.1 ms a vertex made.
+/// a manifold, and where this build has no CGAL; NumericalError where a cap is reached; Cancelled. Small
+/// components that refinement cannot represent are copied. An empty mesh gives an empty mesh. Cost: about 0.1
+/// ms a vertex made.
 TriMesh delaunay_remesh(const TriMesh& mesh, const DelaunayRemeshOptions& options,
                         const Progress& progress = {});
 

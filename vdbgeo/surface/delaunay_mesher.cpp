@@ -163,11 +163,11 @@ class DelaunayMesher::Impl {
     /// infinite or too little is gained.
     Vec3d cross(Vec3d a, Vec3d b, double u, double v) const {
         int last = 0;
-        for (int step = 0; step < 200; ++step) {
+        for (int step = 0; step < 400; ++step) {
             const double length = (b - a).norm();
             if (!(length > tolerance_)) break;
             double t = u / (u - v);
-            if (!std::isfinite(t) || step % 4 == 3) t = 0.5;
+            if (!std::isfinite(u) || !std::isfinite(v) || !std::isfinite(t) || step % 4 == 3) t = 0.5;
             const double margin = std::min(0.5, 0.5 * tolerance_ / length);
             t = std::min(1 - margin, std::max(margin, t));
             const Vec3d m = a + t * (b - a);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/split_non_manifold.h"
 #include "vdbgeo/surface/marching_cubes.h"
 #include "vdbgeo/surface/seeded_delaunay.h"
 #include "vdbgeo/surface/trilinear_field.h"
@@ -134,6 +135,7 @@ TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& op
         if (solid.turned()) std::swap(t[1], t[2]);
         out.triangles.push_back(t);
     }
+    split_non_manifold(out);  // where sheets touch in one edge
     return out;
 }
 

@@ -1,14 +1,10 @@
 #include "vdbgeo/surface/seeded_delaunay.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
-
-#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 namespace {
@@ -17,6 +13,7 @@ constexpr int max_rounds = 5;
 constexpr double thinnest = 1.0 / 64;     // in radius bounds, that is followed
 constexpr std::size_t max_thin = 200000;  // points a round
 constexpr double seed_spacing = 1.2;      // in radius bounds
+constexpr double small_to_copy = 8;       // in radius bounds: diagonal of a component
 constexpr double small_component = 0.15;  // its radius bound, in its diagonals
 
 /// Numbers kept by the cube of space they are in.
@@ -181,6 +178,7 @@ class SeededRun {
     void follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, int depth);
     std::vector<Vec3d> densify(const Faults& faults);
     double expected_vertices() const;
+    DelaunayMesh mended(const DelaunayMesh& mesh) const;
 
     const Solid& solid_;
     const ReferenceMesh& reference_;
@@ -483,6 +481,62 @@ double SeededRun::expected_vertices() const {
     return vertices;
 }
 
+/// Where refinement ended with other components than the reference: those of the reference that are missing,
+/// and small ones that are joined or parted, are taken from the reference as they are.
+DelaunayMesh SeededRun::mended(const DelaunayMesh& mesh) const {
+    const Components got = components_of(mesh.points.size(), mesh.triangles);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> links;  // component of the reference, component here
+    for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+        if (mesh.seed[v] == DelaunayMesh::no_seed) continue;
+        const std::uint32_t part = seed_part_[mesh.seed[v]];
+        if (part != DelaunayMesh::no_seed) links.emplace_back(part, got.of_point[v]);
+    }
+    std::sort(links.begin(), links.end());
+    links.erase(std::unique(links.begin(), links.end()), links.end());
+    // Clusters of components that are linked: numbers from parts_.count on are components here.
+    std::vector<std::uint32_t> parent(parts_.count + got.count), left(parent.size()), right(parent.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t n) {
+        while (parent[n] != n) n = parent[n] = parent[parent[n]];
+        return n;
+    };
+    for (const auto& [p, g] : links) {
+        const std::uint32_t a = root(p), b = root(parts_.count + g);
+        parent[std::max(a, b)] = std::min(a, b);
+    }
+    std::vector<char> large(parent.size(), 0);
+    for (std::uint32_t p = 0; p < parts_.count; ++p) {
+        ++left[root(p)];
+        const double size = (part_[p].high - part_[p].low).norm();
+        if (part_[p].open || size > small_to_copy * bounds_.radius) large[root(p)] = 1;
+    }
+    for (std::uint32_t g = 0; g < got.count; ++g) ++right[root(parts_.count + g)];
+    const auto copied = [&](std::uint32_t n) {
+        const std::uint32_t r = root(n);
+        const bool missing = left[r] == 1 && right[r] == 0 && !part_[r].open;
+        return missing || (left[r] > 0 && !large[r] && !(left[r] == 1 && right[r] == 1));
+    };
+    DelaunayMesh out;
+    const auto add = [&](const auto& points, const auto& triangles, const auto& wanted) {
+        std::vector<std::uint32_t> number(points.size(), DelaunayMesh::no_seed);
+        for (Triangle t : triangles) {
+            if (!wanted(t[0])) continue;
+            for (VertexId& v : t) {
+                if (number[v] == DelaunayMesh::no_seed) {
+                    number[v] = static_cast<std::uint32_t>(out.points.size());
+                    out.points.push_back(points[v]);
+                    out.seed.push_back(DelaunayMesh::no_seed);
+                }
+                v = number[v];
+            }
+            out.triangles.push_back(t);
+        }
+    };
+    add(mesh.points, mesh.triangles, [&](VertexId v) { return !copied(parts_.count + got.of_point[v]); });
+    add(reference_.points, reference_.triangles, [&](VertexId v) { return copied(parts_.of_point[v]); });
+    return out;
+}
+
 DelaunayMesh SeededRun::run() {
     std::vector<Vec3d> seeds = make_seeds([](const Vec3d&) { return true; });
     for (const Vec3d& p : reference_.extra_seeds) {
@@ -496,14 +550,8 @@ DelaunayMesh SeededRun::run() {
         const bool last = round + 1 == max_rounds;
         Faults faults = compare(mesh, !last);
         if (!last) add_uncovered(mesh, faults);
-        if (faults.places.empty() && faults.thin_places.empty()) {
-            if (faults.missing == 0) return mesh;
-            throw NumericalError(
-                fmt::format("of {} components of the surface, Delaunay refinement missed {}, joined {} with "
-                            "others and split {}: "
-                            "try a smaller radius, or another isovalue",
-                            parts_.count, faults.missing, faults.joined, faults.parted));
-        }
+        if (faults.places.empty() && faults.thin_places.empty())
+            return faults.components_differ() ? mended(mesh) : mesh;
         seeds = densify(faults);
     }
 }

@@ -31,9 +31,10 @@ struct SeededBounds {
 /// the result. Components of less than seven radii across have a smaller radius bound, 0.15 of their size.
 /// What came out is compared with the reference: where a component is missing, or two are one, or one is two,
 /// or a vertex of the reference is farther than the radius bound from every vertex of the result, seeds are
-/// added there and the radius bound near there is halved, and the refinement goes on, up to eight times. Open
-/// components of the reference may be joined with each other. Throws NumericalError where components still
-/// differ then, and at a cap; Cancelled.
+/// added there and the radius bound near there is halved, and the refinement goes on, up to four times. Open
+/// components of the reference may be joined with each other. Where components still differ
+/// then, missing and small ones are copied from the reference; large ones may stay joined or parted. Throws
+/// NumericalError at a cap; Cancelled.
 DelaunayMesh seeded_delaunay(const Solid& solid, const Vec3d& low, const Vec3d& high,
                              const ReferenceMesh& reference, const SeededBounds& bounds,
                              const Progress& progress);

@@ -73,8 +73,8 @@ std::vector<Vec3d> border_seeds(const Frame& frame, const MapSolid& solid, doubl
 
 void DelaunaySurfaceOptions::check() const {
     if (!std::isfinite(isovalue)) throw InvalidInput("the isovalue must be a finite number");
-    if (!(angle_deg >= 0 && angle_deg <= 35))
-        throw InvalidInput(fmt::format("the angle bound is {:g}°: 0 to 35 are possible", angle_deg));
+    if (!(angle_deg >= 0 && angle_deg <= 30))
+        throw InvalidInput(fmt::format("the angle bound is {:g}°: 0 to 30 are possible", angle_deg));
     if (!(radius >= 0.01 && radius <= 1000))
         throw InvalidInput(fmt::format("the radius bound is {:g} voxels: 0.01 to 1000 are possible", radius));
     if (!(distance >= 0.001 && distance <= 1000))

@@ -12,7 +12,7 @@ namespace vdbgeo {
 /// The three bounds of the paper's §2.3 (30°, 0.8, 0.8 there).
 struct DelaunaySurfaceOptions {
     double isovalue = 0;
-    double angle_deg = 30;  ///< least angle of a triangle; up to 30 the refinement is sure to end
+    double angle_deg = 30;  ///< least angle of a triangle; up to 30, where the refinement is sure to end
     double radius = 0.8;    ///< largest radius of a triangle's surface Delaunay ball, in voxels
     double distance =
         0.8;  ///< largest distance from a triangle's circumcentre to its ball's centre, in voxels
@@ -25,6 +25,24 @@ struct DelaunaySurfaceOptions {
 /// Whether this build has CGAL.
 bool have_delaunay();
 
+/// The surface {u = isovalue} of a map's trilinear interpolant u, as marching_cubes takes it, by restricted
+/// Delaunay refinement (Boissonnat & Oudot 2005, doi:10.1016/j.gmod.2005.01.004) on CGAL's Delaunay
+/// triangulation. A voxel is the smallest of the three voxel steps; lengths are measured in the world, so
+/// that skewed and anisotropic frames give well-shaped triangles too. Vertices lie on the surface, normals
+/// point from dense to empty. Closed: outside the box of a bounded frame counts as empty, and there the
+/// surface is the border of the box.
+///
+/// Refinement starts from seeds on all of the marching-cubes surface (about two thirds of the vertices of the
+/// result), so that no component is missed; those of less than seven radii across are meshed finer, at
+/// 0.15 of their size. The result is compared with marching cubes and refined where a component is missing,
+/// joined or parted, or a part is not covered, following the thickness of necks down to 1/64 of the radius;
+/// thinner ones may come out parted. Triangles keep the angle bound down to balls of 1/512 of the radius, the
+/// end of refinement at a crease.
+///
+/// The same bytes in each run, for any number of threads (one is used). Cost: about 45 µs and 1.5 KB a
+/// vertex. An isovalue that nothing crosses gives an empty mesh. Throws InvalidInput for an option out of
+/// range and where this build has no CGAL; NumericalError where a cap is reached (naming it) or components
+/// are still missing (naming how many); Cancelled.
 TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& options,
                          const Progress& progress = {});
 

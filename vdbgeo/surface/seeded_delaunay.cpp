@@ -241,7 +241,7 @@ Vec3d SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3
     const bool inside = start >= 0;
     const Vec3d out = inside ? normal : Vec3d(-normal);
     double near = 0, far = 0;
-    for (double reach = bounds_.radius / 1024; reach < 0.6 * bounds_.radius; reach *= 2) {
+    for (double reach = bounds_.radius / 512; reach < 0.6 * bounds_.radius; reach *= 2) {
         if ((solid_(centre + reach * out) >= 0) != inside) {
             far = reach;
             break;

@@ -19,7 +19,7 @@ struct DelaunayRemeshOptions {
 };
 
 /// A new mesh of the surface of `mesh`, as restricted Delaunay refinement makes one (delaunay_surface.h): its
-/// vertices lie on the input's faces, its angles are at least the bound (but for balls under 1/512 of the
+/// vertices lie on the input's faces, its angles are at least the bound (but for balls under 1/16384 of the
 /// radius, at creases), every component of the input is there, cavities too, and normals point out of the
 /// solid. Creases and corners sharper than the bounds are rounded off within them. Properties are not kept.
 ///

@@ -36,8 +36,8 @@ bool have_delaunay();
 /// result), so that no component is missed; those of less than seven radii across are meshed finer, at
 /// 0.15 of their size. The result is compared with marching cubes and refined where a component is missing,
 /// joined or parted, or a part is not covered, following the thickness of necks down to 1/64 of the radius;
-/// thinner ones may come out parted. Triangles keep the angle bound down to balls of 1/512 of the radius, the
-/// end of refinement at a crease.
+/// thinner ones may come out parted. Triangles keep the angle bound down to balls of 1/16384 of the radius,
+/// the end of refinement at a crease.
 ///
 /// The same bytes in each run, for any number of threads (one is used). Cost: about 45 µs and 1.5 KB a
 /// vertex. An isovalue that nothing crosses gives an empty mesh. Throws InvalidInput for an option out of

@@ -132,14 +132,13 @@ class SeededRun {
     };
     struct ThinPoint {
         Vec3d place, normal;
-        std::uint32_t part;  // of a missing component
+        std::uint32_t part;
     };
     struct Faults {
-        std::uint64_t missing = 0, joined = 0, parted = 0;
-        std::vector<Vec3d> places;       // to be seeded denser
-        std::vector<Vec3d> thin_places;  // where the surface is joined or parted
+        std::uint64_t missing = 0, joined = 0, parted = 0, fragments = 0;
+        std::vector<Vec3d> thin_places;  // where the surface is joined, parted or not covered
         std::vector<char> is_missing;    // per component of the reference
-        bool components_differ() const { return missing + joined + parted > 0; }
+        bool components_differ() const { return missing + joined + parted + fragments > 0; }
     };
 
     DelaunayBounds delaunay_bounds() {
@@ -147,7 +146,7 @@ class SeededRun {
         out.angle_deg = bounds_.angle_deg;
         out.radius = bounds_.radius;
         out.distance = bounds_.distance;
-        out.smallest = bounds_.radius / 512;
+        out.smallest = bounds_.radius / 16384;
         out.max_vertices = bounds_.max_vertices;
         out.max_seconds = bounds_.max_seconds;
         out.deadline = std::chrono::steady_clock::now() +
@@ -179,8 +178,7 @@ class SeededRun {
     void measure_components();
     void find_open_components();
     std::optional<Vec3d> on_surface(const Vec3d& centre, const Vec3d& normal, double size) const;
-    template <class Wanted>
-    std::vector<Vec3d> make_seeds(const Wanted& wanted);
+    std::vector<Vec3d> make_seeds();
     Faults compare(const DelaunayMesh& mesh, bool places) const;
     void add_uncovered(const DelaunayMesh& mesh, Faults& faults) const;
     double thickness(const Vec3d& p, const Vec3d& normal, double least) const;
@@ -262,10 +260,9 @@ std::optional<Vec3d> SeededRun::on_surface(const Vec3d& centre, const Vec3d& nor
     return centre + 0.5 * (near + far) * out;
 }
 
-/// Seeds on the faces that are wanted, none nearer than the spacing to another of the same component that
+/// Seeds on the faces, none nearer than the spacing to another of the same component that
 /// faces the same way.
-template <class Wanted>
-std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
+std::vector<Vec3d> SeededRun::make_seeds() {
     struct Seed {
         Vec3d place, normal;
         std::uint32_t part;
@@ -276,7 +273,6 @@ std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
         const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
         const std::uint32_t part = parts_.of_point[t[0]];
         const Vec3d centre = (a + b + c) / 3;
-        if (!wanted(centre)) continue;
         const bool small = part_[part].radius < bounds_.radius;
         const double spacing =
             (small ? 0.5 : 1) * seed_spacing * std::min(part_[part].radius, local_radius(centre));
@@ -307,12 +303,14 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
     const Components got = components_of(mesh.points.size(), mesh.triangles);
     // Through the seeds, a bipartite graph between the components here and there.
     std::vector<std::vector<std::uint32_t>> there(parts_.count), here(got.count);
+    std::vector<char> known(got.count, 0);  // has a seed
     const auto note = [](std::vector<std::uint32_t>& list, std::uint32_t n) {
         if (std::find(list.begin(), list.end(), n) == list.end()) list.push_back(n);
     };
     for (std::size_t v = 0; v < mesh.points.size(); ++v) {
         if (mesh.seed[v] == DelaunayMesh::no_seed) continue;
         const std::uint32_t part = seed_part_[mesh.seed[v]];
+        known[got.of_point[v]] = 1;
         if (part == DelaunayMesh::no_seed) continue;
         note(there[part], got.of_point[v]);
         note(here[got.of_point[v]], part);
@@ -328,6 +326,7 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
         }
     }
     for (std::uint32_t g = 0; g < got.count; ++g) {
+        faults.fragments += known[g] ? 0 : 1;
         if (here[g].size() < 2) continue;
         const auto closed =
             std::count_if(here[g].begin(), here[g].end(), [&](std::uint32_t p) { return !part_[p].open; });
@@ -338,6 +337,8 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
     if (!places || !faults.components_differ()) return faults;
 
     const double reach = bounds_.radius;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v)
+        if (!known[got.of_point[v]]) faults.thin_places.push_back(mesh.points[v]);
     SpaceHash vertices(reach), points(reach);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
     const auto nearest = [&](const SpaceHash& hash, const Vec3d& p, const auto& at, const auto& of,
@@ -390,7 +391,7 @@ void SeededRun::add_uncovered(const DelaunayMesh& mesh, Faults& faults) const {
     for (const Vec3d& p : reference_.points) {
         const bool covered = vertices.near(
             p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; });
-        if (!covered) faults.places.push_back(p);
+        if (!covered) faults.thin_places.push_back(p);
     }
 }
 
@@ -407,10 +408,11 @@ double SeededRun::thickness(const Vec3d& p, const Vec3d& normal, double least) c
 void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t part,
                                  int depth) {
     double least = thinnest * bounds_.radius;
-    if (part != DelaunayMesh::no_seed) least = std::min(least, 0.15 * part_[part].radius);
+    if (part_[part].radius < bounds_.radius) least = std::min(least, 0.15 * part_[part].radius);
     const Vec3d flat = (b - a).cross(c - a).normalized(), centre = (a + b + c) / 3;
     if (!flat.allFinite() || thin_.size() > max_thin) return;
-    const std::optional<Vec3d> found = on_surface(centre, flat, std::sqrt((b - a).cross(c - a).norm()));
+    std::optional<Vec3d> found = on_surface(centre, flat, std::sqrt((b - a).cross(c - a).norm()));
+    if (found && (*found - centre).norm() > 0.25 * bounds_.radius) found.reset();  // another sheet, maybe
     const Vec3d p = found.value_or(centre);
     const double h = 1e-3 * least;
     Vec3d normal = -Vec3d(solid_(p + h * Vec3d::UnitX()) - solid_(p - h * Vec3d::UnitX()),
@@ -435,36 +437,26 @@ void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c,
     follow_thickness(m, v, w, part, depth - 1);
 }
 
-/// Lowers the radius bound: around the places by half, around the thin ones to a part of the thickness there.
-/// Seeds for both.
+/// Lowers the radius bound on missing components and around the thin places to a part of the thickness there,
+/// and seeds them as densely.
 std::vector<Vec3d> SeededRun::densify(const Faults& faults) {
-    struct Near {
-        const std::vector<Vec3d>& places;
-        double reach;
-        SpaceHash hash;
-        Near(const std::vector<Vec3d>& of, double r) : places(of), reach(r), hash(r) {
-            for (std::uint32_t i = 0; i < places.size(); ++i) hash.add(places[i], i);
-        }
-        bool operator()(const Vec3d& p) const {
-            return hash.near(p,
-                             [&](std::uint32_t n) { return (places[n] - p).squaredNorm() < reach * reach; });
-        }
+    const double reach = 0.7 * bounds_.radius;
+    SpaceHash hash(reach);
+    for (std::uint32_t i = 0; i < faults.thin_places.size(); ++i) hash.add(faults.thin_places[i], i);
+    const auto thin = [&](const Vec3d& p) {
+        return hash.near(
+            p, [&](std::uint32_t n) { return (faults.thin_places[n] - p).squaredNorm() < reach * reach; });
     };
-    std::vector<double> half;
-    for (const Vec3d& p : faults.places)
-        half.push_back(std::max(0.5 * local_radius(p), bounds_.radius / 512));
-    const Near thin(faults.thin_places, bounds_.radius), place(faults.places, bounds_.radius);
     thin_.clear();
     for (const Triangle& t : reference_.triangles) {
         const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
         const std::uint32_t part = parts_.of_point[t[0]];
         if (faults.is_missing[part])
-            follow_thickness(a, b, c, part, 10);
-        else if (!faults.thin_places.empty() && thin((a + b + c) / 3))
-            follow_thickness(a, b, c, DelaunayMesh::no_seed, 8);
+            follow_thickness(a, b, c, part, 11);
+        else if (thin((a + b + c) / 3))
+            follow_thickness(a, b, c, part, 11);
     }
-    for (std::size_t i = 0; i < faults.places.size(); ++i) add_spot(faults.places[i], half[i]);
-    std::vector<Vec3d> seeds = make_seeds(place);
+    std::vector<Vec3d> seeds;
     SpaceHash taken(bounds_.radius);
     for (std::uint32_t i = 0; i < thin_.size(); ++i) {
         const ThinPoint& point = thin_[i];
@@ -493,7 +485,7 @@ double SeededRun::expected_vertices() const {
 }
 
 DelaunayMesh SeededRun::run() {
-    std::vector<Vec3d> seeds = make_seeds([](const Vec3d&) { return true; });
+    std::vector<Vec3d> seeds = make_seeds();
     for (const Vec3d& p : reference_.extra_seeds) {
         seeds.push_back(p);
         seed_part_.push_back(DelaunayMesh::no_seed);
@@ -511,7 +503,7 @@ DelaunayMesh SeededRun::run() {
                             faults.missing, parts_.count));
         if (last) return mesh;
         add_uncovered(mesh, faults);
-        if (faults.missing == 0 && faults.places.empty() && faults.thin_places.empty()) return mesh;
+        if (faults.missing == 0 && faults.thin_places.empty()) return mesh;
         seeds = densify(faults);
     }
 }

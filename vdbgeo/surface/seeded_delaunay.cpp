@@ -137,7 +137,8 @@ class SeededRun {
     struct Faults {
         std::uint64_t missing = 0, joined = 0, parted = 0, fragments = 0;
         std::vector<Vec3d> thin_places;  // where the surface is joined, parted or not covered
-        std::vector<char> is_missing;    // per component of the reference
+        std::vector<VertexId> uncovered;
+        std::vector<char> is_missing;  // per component of the reference
         bool components_differ() const { return missing + joined + parted + fragments > 0; }
     };
 
@@ -388,10 +389,13 @@ void SeededRun::add_uncovered(const DelaunayMesh& mesh, Faults& faults) const {
     const double reach = bounds_.radius;
     SpaceHash vertices(reach);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
-    for (const Vec3d& p : reference_.points) {
-        const bool covered = vertices.near(
-            p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; });
-        if (!covered) faults.thin_places.push_back(p);
+    for (VertexId v = 0; v < reference_.points.size(); ++v) {
+        const Vec3d& p = reference_.points[v];
+        if (vertices.near(
+                p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; }))
+            continue;
+        faults.thin_places.push_back(p);
+        faults.uncovered.push_back(v);
     }
 }
 
@@ -457,6 +461,12 @@ std::vector<Vec3d> SeededRun::densify(const Faults& faults) {
             follow_thickness(a, b, c, part, 11);
     }
     std::vector<Vec3d> seeds;
+    for (const VertexId v : faults.uncovered) {
+        const Vec3d& p = reference_.points[v];
+        add_spot(p, std::max(0.5 * local_radius(p), 2 * thinnest * bounds_.radius));
+        seeds.push_back(p);
+        seed_part_.push_back(parts_.of_point[v]);
+    }
     SpaceHash taken(bounds_.radius);
     for (std::uint32_t i = 0; i < thin_.size(); ++i) {
         const ThinPoint& point = thin_[i];

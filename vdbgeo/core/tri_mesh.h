@@ -22,8 +22,8 @@ struct MeshProperty {
     std::vector<float> values;  ///< components × number of vertices (or faces), element after element
 };
 
-/// The face property that is above ½ on caps: faces that close a surface at the border of a map and are no part of the
-/// specimen. Areas and curvatures leave them out.
+/// The face property that is above ½ on caps: faces that close a surface at the border of a map and are no
+/// part of the specimen. Areas and curvatures leave them out.
 inline constexpr const char* cap_property = "cap";
 
 /// Triangles over shared points, in Å. Counter-clockwise seen from outside: normals point from dense to

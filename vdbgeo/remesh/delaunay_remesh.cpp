@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/core/split_non_manifold.h"
 #include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/remesh/mesh_solid.h"
 #include "vdbgeo/surface/delaunay_surface.h"
@@ -67,7 +66,6 @@ TriMesh delaunay_remesh(const TriMesh& mesh, const DelaunayRemeshOptions& option
     TriMesh out;
     for (const Vec3d& p : found.points) out.points.push_back((p + centre).cast<float>());
     for (const Triangle& t : found.triangles) out.triangles.push_back(t);
-    split_non_manifold(out);  // where sheets touch in one edge
     return out;
 }
 

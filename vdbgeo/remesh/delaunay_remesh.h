@@ -19,14 +19,13 @@ struct DelaunayRemeshOptions {
 };
 
 /// A new mesh of the surface of `mesh`, as restricted Delaunay refinement makes one (delaunay_surface.h): its
-/// vertices lie on the input's faces, its angles are at least the bound (but for balls under 1/512 of the
+/// vertices lie on the input's faces, its angles are at least the bound (but for balls under 1/16384 of the
 /// radius, at creases), every component of the input is there, cavities too, and normals point out of the
 /// solid. Creases and corners sharper than the bounds are rounded off within them. Properties are not kept.
 ///
 /// Throws InvalidInput for an option out of range, for a mesh that is open, not consistently oriented or not
-/// a manifold, and where this build has no CGAL; NumericalError where a cap is reached; Cancelled. Small
-/// components that refinement cannot represent are copied. An empty mesh gives an empty mesh. Cost: about 0.1
-/// ms a vertex made.
+/// a manifold, and where this build has no CGAL; NumericalError where a cap is reached or a component cannot
+/// be meshed; Cancelled. An empty mesh gives an empty mesh. Cost: about 0.1 ms a vertex made.
 TriMesh delaunay_remesh(const TriMesh& mesh, const DelaunayRemeshOptions& options,
                         const Progress& progress = {});
 

@@ -46,7 +46,9 @@ bool MeshSolid::above(const Triangle& t, const Vec3d& p) const {
     const auto left = [&](VertexId from, VertexId to) {
         const bool turned = from > to;
         const Vec3d &a = points_[turned ? to : from], &b = points_[turned ? from : to];
-        const double side = (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
+        double side = (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
+        if (side == 0) side = a.y() - b.y();
+        if (side == 0) side = b.x() - a.x();
         return (side >= 0) != turned;
     };
     const bool first = left(t[0], t[1]);

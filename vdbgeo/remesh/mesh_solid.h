@@ -10,8 +10,8 @@
 namespace vdbgeo {
 
 /// +∞ inside, −∞ outside: a place is inside where the line up from it goes through an odd number of faces.
-/// Faces are found by the square of the xy plane that they lie over. A line through an edge is taken to pass
-/// on that side of it which the edge's ends' numbers tell, the same for both faces of the edge.
+/// Faces are found by the square of the xy plane that they lie over. A line through an edge or a vertex is
+/// taken to be moved by an infinitesimal (ε, ε²), so that it passes on one side for all faces there.
 class MeshSolid final : public Solid {
  public:
     MeshSolid(std::vector<Vec3d> points, const Array<Triangle>& triangles);

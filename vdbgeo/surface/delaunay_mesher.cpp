@@ -58,6 +58,8 @@ using Facet = Triangulation::Facet;
 Vec3d exact_circumcentre(const std::array<Vec3d, 4>& p) {
     using Exact = CGAL::Simple_cartesian<CGAL::Exact_rational>;
     const auto at = [&](std::size_t k) { return Exact::Point_3(p[k].x(), p[k].y(), p[k].z()); };
+    if (CGAL::coplanar(at(0), at(1), at(2), at(3)))
+        return Vec3d::Constant(std::numeric_limits<double>::infinity());
     const Exact::Point_3 c = CGAL::circumcenter(at(0), at(1), at(2), at(3));
     return {CGAL::to_double(c.x()), CGAL::to_double(c.y()), CGAL::to_double(c.z())};
 }
@@ -100,7 +102,7 @@ class DelaunayMesher::Impl {
             insert_first(seeds);
         } else {
             for (std::size_t i = 0; i < seeds.size(); ++i)
-                insert(seeds[i], hint_, first_seed_ + static_cast<std::uint32_t>(i));
+                add_seed(seeds[i], first_seed_ + static_cast<std::uint32_t>(i));
         }
         first_seed_ += static_cast<std::uint32_t>(seeds.size());
         if (triangulation_.dimension() < 3) return;
@@ -213,7 +215,7 @@ class DelaunayMesher::Impl {
         const double local = bounds_.local_radius ? bounds_.local_radius(centre) : bounds_.radius;
         const double ball = (p[0] - centre).squaredNorm(), radius = local * local;
         if (ball > radius) return radius / ball;
-        const double least = std::min(bounds_.smallest, 0.1 * local);
+        const double least = std::min(bounds_.smallest, 0.01 * local);
         if (ball < least * least) return {};
         const Vec3d u = p[1] - p[0], v = p[2] - p[0], n = u.cross(v);
         const double area = n.squaredNorm();  // (2·area)²
@@ -290,9 +292,20 @@ class DelaunayMesher::Impl {
             tick();
             set_up(c);
         }
-        for (auto f = triangulation_.finite_facets_begin(); f != triangulation_.finite_facets_end(); ++f)
-            look(f->first, f->second);
+        // (CGAL's order of the facets follows the cells' addresses.)
+        for_each_facet([this](const Facet& f) { look(f.first, f.second); });
         hint_ = triangulation_.finite_vertices_begin()->cell();
+    }
+
+    /// A seed near a vertex would make a triangle that is too small to be refined: the vertex takes its
+    /// number.
+    void add_seed(const Vec3d& place, std::uint32_t seed) {
+        const Vertex v = triangulation_.nearest_vertex(point(place), hint_);
+        const double spacing = 0.3 * (bounds_.local_radius ? bounds_.local_radius(place) : bounds_.radius);
+        if ((vec(v->point()) - place).squaredNorm() > spacing * spacing)
+            insert(place, v->cell(), seed);
+        else if (v->info().seed == DelaunayMesh::no_seed)
+            v->info().seed = seed;
     }
 
     /// False where there is a vertex at the place already.
@@ -303,11 +316,7 @@ class DelaunayMesher::Impl {
         Triangulation::Locate_type type;
         int i, j;
         const Cell start = triangulation_.locate(p, type, i, j, near);
-        if (type == Triangulation::VERTEX) {
-            if (seed != DelaunayMesh::no_seed && start->vertex(i)->info().seed == DelaunayMesh::no_seed)
-                start->vertex(i)->info().seed = seed;
-            return false;
-        }
+        if (type == Triangulation::VERTEX) return false;
         hole_.clear();
         rim_.clear();
         triangulation_.find_conflicts(p, start, std::back_inserter(rim_), std::back_inserter(hole_));
@@ -464,11 +473,15 @@ bool DelaunayMesher::Impl::refine_singular() {
             }
         }
     }
+    // Far below the smallest ball only where nothing else is left.
     bool any = false;
-    const double least = 0.01 * bounds_.smallest;
-    for (std::size_t n = 0; n < vertices.size(); ++n)
-        if (bad[n] && size[n] > least * least && insert(place[n], vertices[n]->cell(), DelaunayMesh::no_seed))
-            any = true;
+    for (const double least : {bounds_.smallest, 0.01 * bounds_.smallest}) {
+        for (std::size_t n = 0; n < vertices.size(); ++n)
+            if (bad[n] && size[n] > least * least &&
+                insert(place[n], vertices[n]->cell(), DelaunayMesh::no_seed))
+                any = true;
+        if (any) break;
+    }
     return any;
 }
 

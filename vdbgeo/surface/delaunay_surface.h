@@ -33,19 +33,19 @@ bool have_delaunay();
 /// surface is the border of the box.
 ///
 /// Refinement starts from seeds on all of the marching-cubes surface (about two thirds of the vertices of the
-/// result), so that no component is missed; those of less than seven radii across are meshed finer, at
-/// 0.15 of their size. The result is compared with marching cubes and refined where a component is missing,
-/// joined or parted, or a part is not covered, following the thickness of necks down to 1/64 of the radius;
-/// thinner ones may come out parted, so that a noisy map can have a few components more than by marching
-/// cubes: measure_mesh tells. Components still missing then, and closed ones of up to eight radii across that
-/// are still joined or parted, are copied from marching cubes, whose angles are what they are. Vertices where
-/// sheets touch are split: the result is always closed and a manifold. Other triangles keep the angle bound
-/// down to balls of 1/512 of the radius, the end of refinement at a crease.
+/// result), so that no component is missed; those of less than seven radii across are meshed finer, at 0.15
+/// of their size. The result is compared with marching cubes, and refined where a component is missing,
+/// joined or parted, or a vertex is farther than the radius from the result; there the bound follows the
+/// thickness of necks and spikes down to 1/64 of the radius. Thinner ones may be cut: what hangs by such a
+/// neck is a component of its own then, and the tip of such a spike is missing. Components still missing
+/// then, and closed ones of up to eight radii across that are joined or parted, are copied from marching
+/// cubes, whose angles are what they are. Triangles keep the angle bound down to balls of 1/16384 of the
+/// radius; such small ones lose some of it when their coordinates are rounded to floats. Vertices where
+/// sheets touch are split: the result is always closed and a manifold.
 ///
 /// The same bytes in each run, for any number of threads (one is used). Cost: about 45 µs and 1.5 KB a
 /// vertex. An isovalue that nothing crosses gives an empty mesh. Throws InvalidInput for an option out of
-/// range and where this build has no CGAL; NumericalError where a cap is reached (naming it);
-/// Cancelled.
+/// range and where this build has no CGAL; NumericalError where a cap is reached (naming it); Cancelled.
 TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& options,
                          const Progress& progress = {});
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <unordered_map>
 
 namespace vdbgeo {
@@ -126,11 +127,16 @@ class SeededRun {
         Vec3d place;
         double radius;
     };
+    struct ThinPoint {
+        Vec3d place, normal;
+        std::uint32_t part;
+    };
     struct Faults {
-        std::uint64_t missing = 0, joined = 0, parted = 0;
-        std::vector<Vec3d> places;       // to be seeded denser
-        std::vector<Vec3d> thin_places;  // where the surface is joined or parted
-        bool components_differ() const { return missing + joined + parted > 0; }
+        std::uint64_t missing = 0, joined = 0, parted = 0, fragments = 0;
+        std::vector<Vec3d> thin_places;  // where the surface is joined, parted or not covered
+        std::vector<VertexId> uncovered;
+        std::vector<char> is_missing;  // per component of the reference
+        bool components_differ() const { return missing + joined + parted + fragments > 0; }
     };
 
     DelaunayBounds delaunay_bounds() {
@@ -138,7 +144,7 @@ class SeededRun {
         out.angle_deg = bounds_.angle_deg;
         out.radius = bounds_.radius;
         out.distance = bounds_.distance;
-        out.smallest = bounds_.radius / 512;
+        out.smallest = bounds_.radius / 16384;
         out.max_vertices = bounds_.max_vertices;
         out.max_seconds = bounds_.max_seconds;
         out.deadline = std::chrono::steady_clock::now() +
@@ -169,13 +175,12 @@ class SeededRun {
 
     void measure_components();
     void find_open_components();
-    Vec3d on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3d& fallback) const;
-    template <class Wanted>
-    std::vector<Vec3d> make_seeds(const Wanted& wanted);
+    std::optional<Vec3d> on_surface(const Vec3d& centre, const Vec3d& normal, double size) const;
+    std::vector<Vec3d> make_seeds();
     Faults compare(const DelaunayMesh& mesh, bool places) const;
     void add_uncovered(const DelaunayMesh& mesh, Faults& faults) const;
-    double thickness(const Vec3d& p, const Vec3d& normal) const;
-    void follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, int depth);
+    double thickness(const Vec3d& p, const Vec3d& normal, double least) const;
+    void follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t part, int depth);
     std::vector<Vec3d> densify(const Faults& faults);
     double expected_vertices() const;
     DelaunayMesh mended(const DelaunayMesh& mesh) const;
@@ -189,7 +194,7 @@ class SeededRun {
     std::vector<std::uint32_t> seed_part_;  // of every seed so far; an extra seed has none
     SpaceHash fine_;
     std::vector<Spot> spots_;
-    std::vector<std::pair<Vec3d, Vec3d>> thin_;  // points of thin parts, with their normals
+    std::vector<ThinPoint> thin_;
     DelaunayMesher mesher_;
 };
 
@@ -231,33 +236,32 @@ void SeededRun::find_open_components() {
     }
 }
 
-/// The point of the surface on the normal through a face's centre, or one of the face's corners where it is
-/// not within half a radius bound. (Corners lie on the lattice's edges, many in one plane: bad for exact
-/// predicates.)
-Vec3d SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, const Vec3d& fallback) const {
-    const double start = solid_(centre);
-    const bool inside = start >= 0;
+/// The point of the surface on the normal through a face's centre, where there is one within half a radius
+/// bound. (Corners of faces lie on the lattice's edges, many in one plane: bad for exact predicates.) `size`
+/// is the face's.
+std::optional<Vec3d> SeededRun::on_surface(const Vec3d& centre, const Vec3d& normal, double size) const {
+    const bool inside = solid_(centre) >= 0;
     const Vec3d out = inside ? normal : Vec3d(-normal);
+    const double limit = std::max(0.6 * bounds_.radius, size);
     double near = 0, far = 0;
-    for (double reach = bounds_.radius / 512; reach < 0.6 * bounds_.radius; reach *= 2) {
+    for (double reach = std::min(size, bounds_.radius) / 64; reach < limit; reach *= 1.5) {
         if ((solid_(centre + reach * out) >= 0) != inside) {
             far = reach;
             break;
         }
         near = reach;
     }
-    if (far == 0) return fallback;
-    for (int step = 0; step < 30 && far - near > 1e-6 * bounds_.radius; ++step) {
+    if (far == 0) return {};
+    for (int step = 0; step < 30 && far - near > 1e-5 * far; ++step) {
         const double middle = 0.5 * (near + far);
         ((solid_(centre + middle * out) >= 0) == inside ? near : far) = middle;
     }
     return centre + 0.5 * (near + far) * out;
 }
 
-/// Seeds on the faces that are wanted, none nearer than the spacing to another of the same component that
+/// Seeds on the faces, none nearer than the spacing to another of the same component that
 /// faces the same way.
-template <class Wanted>
-std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
+std::vector<Vec3d> SeededRun::make_seeds() {
     struct Seed {
         Vec3d place, normal;
         std::uint32_t part;
@@ -268,7 +272,6 @@ std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
         const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
         const std::uint32_t part = parts_.of_point[t[0]];
         const Vec3d centre = (a + b + c) / 3;
-        if (!wanted(centre)) continue;
         const bool small = part_[part].radius < bounds_.radius;
         const double spacing =
             (small ? 0.5 : 1) * seed_spacing * std::min(part_[part].radius, local_radius(centre));
@@ -280,7 +283,7 @@ std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
                    s.normal.dot(normal) > 0;
         });
         if (taken) continue;
-        const Vec3d place = on_surface(centre, normal, a);
+        const Vec3d place = on_surface(centre, normal, std::sqrt((b - a).cross(c - a).norm())).value_or(a);
         hash.add(place, static_cast<std::uint32_t>(seeds.size()));
         seeds.push_back({place, normal, part});
     }
@@ -295,31 +298,34 @@ std::vector<Vec3d> SeededRun::make_seeds(const Wanted& wanted) {
 /// Which components of the reference are not there, joined or parted; with `places`, where.
 SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) const {
     Faults faults;
+    faults.is_missing.assign(parts_.count, 0);
     const Components got = components_of(mesh.points.size(), mesh.triangles);
     // Through the seeds, a bipartite graph between the components here and there.
     std::vector<std::vector<std::uint32_t>> there(parts_.count), here(got.count);
+    std::vector<char> known(got.count, 0);  // has a seed
     const auto note = [](std::vector<std::uint32_t>& list, std::uint32_t n) {
         if (std::find(list.begin(), list.end(), n) == list.end()) list.push_back(n);
     };
     for (std::size_t v = 0; v < mesh.points.size(); ++v) {
         if (mesh.seed[v] == DelaunayMesh::no_seed) continue;
         const std::uint32_t part = seed_part_[mesh.seed[v]];
+        known[got.of_point[v]] = 1;
         if (part == DelaunayMesh::no_seed) continue;
         note(there[part], got.of_point[v]);
         note(here[got.of_point[v]], part);
     }
-    std::vector<char> wrong(parts_.count, 0);  // components of the reference to seed denser all over
     std::vector<char> parted(parts_.count, 0), joined(got.count, 0);
     for (std::uint32_t p = 0; p < parts_.count; ++p) {
         if (there[p].empty()) {
             ++faults.missing;
-            wrong[p] = 1;
+            faults.is_missing[p] = 1;
         } else if (there[p].size() > 1) {
             ++faults.parted;
             parted[p] = 1;
         }
     }
     for (std::uint32_t g = 0; g < got.count; ++g) {
+        faults.fragments += known[g] ? 0 : 1;
         if (here[g].size() < 2) continue;
         const auto closed =
             std::count_if(here[g].begin(), here[g].end(), [&](std::uint32_t p) { return !part_[p].open; });
@@ -330,6 +336,8 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
     if (!places || !faults.components_differ()) return faults;
 
     const double reach = bounds_.radius;
+    for (std::size_t v = 0; v < mesh.points.size(); ++v)
+        if (!known[got.of_point[v]]) faults.thin_places.push_back(mesh.points[v]);
     SpaceHash vertices(reach), points(reach);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
     const auto nearest = [&](const SpaceHash& hash, const Vec3d& p, const auto& at, const auto& of,
@@ -355,7 +363,6 @@ SeededRun::Faults SeededRun::compare(const DelaunayMesh& mesh, bool places) cons
             seen[v] = 1;
             const std::uint32_t p = parts_.of_point[v];
             if (any_joined) points.add(reference_.points[v], v);
-            if (wrong[p]) faults.places.push_back(reference_.points[v]);
             if (parted[p])
                 label[v] = nearest(vertices, reference_.points[v], mesh.points, got.of_point, there[p]);
         }
@@ -380,41 +387,45 @@ void SeededRun::add_uncovered(const DelaunayMesh& mesh, Faults& faults) const {
     const double reach = bounds_.radius;
     SpaceHash vertices(reach);
     for (std::uint32_t v = 0; v < mesh.points.size(); ++v) vertices.add(mesh.points[v], v);
-    for (const Vec3d& p : reference_.points) {
-        const bool covered = vertices.near(
-            p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; });
-        if (!covered) faults.places.push_back(p);
+    for (VertexId v = 0; v < reference_.points.size(); ++v) {
+        const Vec3d& p = reference_.points[v];
+        if (vertices.near(
+                p, [&](std::uint32_t n) { return (mesh.points[n] - p).squaredNorm() <= reach * reach; }))
+            continue;
+        faults.thin_places.push_back(p);
+        faults.uncovered.push_back(v);
     }
 }
 
 /// How thick the solid, or the gap outside, is at a point of its surface; nothing where that is more than a
 /// radius.
-double SeededRun::thickness(const Vec3d& p, const Vec3d& normal) const {
-    for (double s = 0.5 * thinnest * bounds_.radius; s < bounds_.radius; s *= 1.3)
+double SeededRun::thickness(const Vec3d& p, const Vec3d& normal, double least) const {
+    for (double s = 0.5 * least; s < bounds_.radius; s *= 1.3)
         if (solid_(p - s * normal) < 0 || solid_(p + s * normal) >= 0) return s;
     return bounds_.radius;
 }
 
 /// The bound follows the thickness over a face, which is split until its parts are as small as the bound
 /// asks.
-void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, int depth) {
+void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t part,
+                                 int depth) {
+    double least = thinnest * bounds_.radius;
+    if (part_[part].radius < bounds_.radius) least = std::min(least, 0.15 * part_[part].radius);
     const Vec3d flat = (b - a).cross(c - a).normalized(), centre = (a + b + c) / 3;
     if (!flat.allFinite() || thin_.size() > max_thin) return;
-    const Vec3d nowhere = Vec3d::Constant(std::numeric_limits<double>::infinity());
-    const Vec3d p = on_surface(centre, flat, nowhere);
-    const bool found = p.allFinite();
-    const double h = 1e-3 * thinnest * bounds_.radius;
+    std::optional<Vec3d> found = on_surface(centre, flat, std::sqrt((b - a).cross(c - a).norm()));
+    if (found && (*found - centre).norm() > 0.25 * bounds_.radius) found.reset();  // another sheet, maybe
+    const Vec3d p = found.value_or(centre);
+    const double h = 1e-3 * least;
     Vec3d normal = -Vec3d(solid_(p + h * Vec3d::UnitX()) - solid_(p - h * Vec3d::UnitX()),
                           solid_(p + h * Vec3d::UnitY()) - solid_(p - h * Vec3d::UnitY()),
                           solid_(p + h * Vec3d::UnitZ()) - solid_(p - h * Vec3d::UnitZ()))
                         .normalized();
     if (!normal.allFinite()) normal = flat;
-    const double size = found
-                            ? std::max(thinnest, 0.5 * thickness(p, normal) / bounds_.radius) * bounds_.radius
-                            : bounds_.radius / 8;
+    const double size = found ? std::max(least, 0.5 * thickness(p, normal, least)) : bounds_.radius / 8;
     if (found && size < 0.3 * bounds_.radius) {
         add_spot(p, size);
-        thin_.emplace_back(p, normal);
+        thin_.push_back({p, normal, part});
     }
     const std::array<const Vec3d*, 3> at = {&a, &b, &c};
     std::size_t longest = 0;
@@ -424,48 +435,48 @@ void SeededRun::follow_thickness(const Vec3d& a, const Vec3d& b, const Vec3d& c,
     if (depth == 0 || length(longest) < 1.5 * size) return;
     const Vec3d &u = *at[longest], &v = *at[(longest + 1) % 3], &w = *at[(longest + 2) % 3],
                 m = 0.5 * (u + v);
-    follow_thickness(u, m, w, depth - 1);
-    follow_thickness(m, v, w, depth - 1);
+    follow_thickness(u, m, w, part, depth - 1);
+    follow_thickness(m, v, w, part, depth - 1);
 }
 
-/// Lowers the radius bound: around the places by half, around the thin ones to a part of the thickness there.
-/// Seeds for both.
+/// Lowers the radius bound on missing components and around the thin places to a part of the thickness there,
+/// and seeds them as densely.
 std::vector<Vec3d> SeededRun::densify(const Faults& faults) {
-    struct Near {
-        const std::vector<Vec3d>& places;
-        double reach;
-        SpaceHash hash;
-        Near(const std::vector<Vec3d>& of, double r) : places(of), reach(r), hash(r) {
-            for (std::uint32_t i = 0; i < places.size(); ++i) hash.add(places[i], i);
-        }
-        bool operator()(const Vec3d& p) const {
-            return hash.near(p,
-                             [&](std::uint32_t n) { return (places[n] - p).squaredNorm() < reach * reach; });
-        }
+    const double reach = 0.7 * bounds_.radius;
+    SpaceHash hash(reach);
+    for (std::uint32_t i = 0; i < faults.thin_places.size(); ++i) hash.add(faults.thin_places[i], i);
+    const auto thin = [&](const Vec3d& p) {
+        return hash.near(
+            p, [&](std::uint32_t n) { return (faults.thin_places[n] - p).squaredNorm() < reach * reach; });
     };
-    std::vector<double> half;
-    for (const Vec3d& p : faults.places)
-        half.push_back(std::max(0.5 * local_radius(p), bounds_.radius / 512));
-    const Near thin(faults.thin_places, bounds_.radius), place(faults.places, bounds_.radius);
     thin_.clear();
     for (const Triangle& t : reference_.triangles) {
         const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
-        if (!faults.thin_places.empty() && thin((a + b + c) / 3)) follow_thickness(a, b, c, 8);
+        const std::uint32_t part = parts_.of_point[t[0]];
+        if (faults.is_missing[part])
+            follow_thickness(a, b, c, part, 11);
+        else if (thin((a + b + c) / 3))
+            follow_thickness(a, b, c, part, 11);
     }
-    for (std::size_t i = 0; i < faults.places.size(); ++i) add_spot(faults.places[i], half[i]);
-    std::vector<Vec3d> seeds = make_seeds(place);
+    std::vector<Vec3d> seeds;
+    for (const VertexId v : faults.uncovered) {
+        const Vec3d& p = reference_.points[v];
+        add_spot(p, std::max(0.5 * local_radius(p), 2 * thinnest * bounds_.radius));
+        seeds.push_back(p);
+        seed_part_.push_back(parts_.of_point[v]);
+    }
     SpaceHash taken(bounds_.radius);
     for (std::uint32_t i = 0; i < thin_.size(); ++i) {
-        const auto& [p, normal] = thin_[i];
-        const double spacing = seed_spacing * local_radius(p);
-        if (taken.near(p, [&](std::uint32_t n) {
-                return (thin_[n].first - p).squaredNorm() < spacing * spacing &&
-                       thin_[n].second.dot(normal) > 0;
+        const ThinPoint& point = thin_[i];
+        const double spacing = 0.8 * seed_spacing * local_radius(point.place);
+        if (taken.near(point.place, [&](std::uint32_t n) {
+                return (thin_[n].place - point.place).squaredNorm() < spacing * spacing &&
+                       thin_[n].normal.dot(point.normal) > 0;
             }))
             continue;
-        taken.add(p, i);
-        seeds.push_back(p);
-        seed_part_.push_back(DelaunayMesh::no_seed);
+        taken.add(point.place, i);
+        seeds.push_back(point.place);
+        seed_part_.push_back(point.part);
     }
     return seeds;
 }
@@ -538,7 +549,7 @@ DelaunayMesh SeededRun::mended(const DelaunayMesh& mesh) const {
 }
 
 DelaunayMesh SeededRun::run() {
-    std::vector<Vec3d> seeds = make_seeds([](const Vec3d&) { return true; });
+    std::vector<Vec3d> seeds = make_seeds();
     for (const Vec3d& p : reference_.extra_seeds) {
         seeds.push_back(p);
         seed_part_.push_back(DelaunayMesh::no_seed);
@@ -549,10 +560,14 @@ DelaunayMesh SeededRun::run() {
         DelaunayMesh mesh = mesher_.surface();
         const bool last = round + 1 == max_rounds;
         Faults faults = compare(mesh, !last);
-        if (!last) add_uncovered(mesh, faults);
-        if (faults.places.empty() && faults.thin_places.empty())
-            return faults.components_differ() ? mended(mesh) : mesh;
-        seeds = densify(faults);
+        if (!last) {
+            add_uncovered(mesh, faults);
+            if (faults.missing > 0 || !faults.thin_places.empty()) {
+                seeds = densify(faults);
+                continue;
+            }
+        }
+        return faults.components_differ() ? mended(mesh) : mesh;
     }
 }
 

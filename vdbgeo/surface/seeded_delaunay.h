@@ -27,14 +27,15 @@ struct SeededBounds {
     double max_seconds = 0;
 };
 
-/// The surface of `solid` by DelaunayMesher, seeded on every component of `reference` at about the density of
-/// the result. Components of less than seven radii across have a smaller radius bound, 0.15 of their size.
-/// What came out is compared with the reference: where a component is missing, or two are one, or one is two,
-/// or a vertex of the reference is farther than the radius bound from every vertex of the result, seeds are
-/// added there and the radius bound near there is halved, and the refinement goes on, up to four times. Open
-/// components of the reference may be joined with each other. Where components still differ
-/// then, missing and small ones are copied from the reference; large ones may stay joined or parted. Throws
-/// NumericalError at a cap; Cancelled.
+/// The surface of `solid` by DelaunayMesher, seeded on every component of `reference` at about two thirds of
+/// the density of the result. Components of less than seven radii across have a smaller radius bound, 0.15 of
+/// their size. What came out is compared with the reference, and up to four times seeds are added, the radius
+/// bound lowered and the refinement carried on: where a component is missing, where two are one or one is two
+/// (there the bound follows the thickness of the necks and gaps, down to 1/64 of the radius bound), and where
+/// a vertex of the reference is farther than the radius bound from every vertex of the result. Open
+/// components of the reference may be joined with each other. Where components still differ then, missing and
+/// small ones are copied from the reference; large ones may stay joined or parted. Throws NumericalError at a
+/// cap; Cancelled.
 DelaunayMesh seeded_delaunay(const Solid& solid, const Vec3d& low, const Vec3d& high,
                              const ReferenceMesh& reference, const SeededBounds& bounds,
                              const Progress& progress);

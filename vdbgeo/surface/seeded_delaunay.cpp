@@ -1,11 +1,15 @@
 #include "vdbgeo/surface/seeded_delaunay.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <unordered_map>
+
+#include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
 namespace {
@@ -48,10 +52,12 @@ class SpaceHash {
  private:
     struct Hash {
         std::size_t operator()(const Cell& c) const {
-            std::uint64_t h = static_cast<std::uint64_t>(c[0]) * 0x9E3779B97F4A7C15ull ^
-                              static_cast<std::uint64_t>(c[1]) * 0xC2B2AE3D27D4EB4Full ^
-                              static_cast<std::uint64_t>(c[2]) * 0x165667B19E3779F9ull;
-            return static_cast<std::size_t>(h ^ h >> 31);
+            std::uint64_t h = 0;
+            for (const std::int64_t number : c) {  // each one is mixed in whole: cells lie on lattices
+                h = (h ^ static_cast<std::uint64_t>(number)) * 0x9E3779B97F4A7C15ull;
+                h ^= h >> 32;
+            }
+            return static_cast<std::size_t>(h);
         }
     };
     double scale_;
@@ -215,6 +221,7 @@ void SeededRun::measure_components() {
             const Part& part = part_[parts_.of_point[v]];
             if (part.radius >= bounds_.radius || marked[v]) continue;
             marked[v] = 1;
+            if (spots_.size() % 4096 == 0) progress_.report(0);
             add_spot(reference_.points[v], part.radius);
         }
 }
@@ -268,7 +275,13 @@ std::vector<Vec3d> SeededRun::make_seeds() {
     };
     std::vector<Seed> seeds;
     SpaceHash hash(seed_spacing * bounds_.radius);
+    std::size_t looked_at = 0;
     for (const Triangle& t : reference_.triangles) {
+        if (looked_at++ % 4096 == 0) progress_.report(0);  // dust makes millions of seeds
+        if (seeds.size() > bounds_.max_vertices)
+            throw NumericalError(fmt::format(
+                "the surface needs more than {} vertices to begin with: drop dust, or allow more vertices",
+                bounds_.max_vertices));
         const Vec3d &a = reference_.points[t[0]], &b = reference_.points[t[1]], &c = reference_.points[t[2]];
         const std::uint32_t part = parts_.of_point[t[0]];
         const Vec3d centre = (a + b + c) / 3;

@@ -55,13 +55,13 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
 }
 
 /// Isovalue → volume, area and pieces of the surface, as numbers, as lines and as a picture.
-Json isovalue_rows(const std::string& file, const InfoOptions& options, Session& session) {
+Json isovalue_rows(const std::string& file, const InfoOptions& options, std::vector<std::string>& lines,
+                   Session& session) {
     const MapFile in = read_map(file, options.map.options, session.stage("reading"));
     const auto rows = naming(file, [&] { return isovalue_table(in.map, {}, session.stage("surfaces")); });
     session.end_stage();
     Json table = Json::array();
-    if (!session.json)
-        session.say(fmt::format("{:>12} {:>8} {:>14} {:>14} {:>8}", "isovalue", "sigmas", "volume Å³",
+    lines.push_back(fmt::format("{:>12} {:>8} {:>14} {:>14} {:>8}", "isovalue", "sigmas", "volume Å³",
                                 "area Å²", "pieces"));
     const Statistics& s = in.map.statistics;
     for (const IsovalueRow& row : rows) {
@@ -71,8 +71,7 @@ Json isovalue_rows(const std::string& file, const InfoOptions& options, Session&
                          {"volume_A3", row.volume_A3},
                          {"area_A2", row.area_A2},
                          {"components", row.components}});
-        if (!session.json)
-            session.say(fmt::format("{:>12.5g} {:>8.3g} {:>14.6g} {:>14.6g} {:>8}", row.isovalue, sigmas,
+        lines.push_back(fmt::format("{:>12.5g} {:>8.3g} {:>14.6g} {:>14.6g} {:>8}", row.isovalue, sigmas,
                                     row.volume_A3, row.area_A2, row.components));
     }
     if (!options.plot.empty()) plot_isovalues(rows, options.plot);
@@ -99,13 +98,13 @@ void run_info(const InfoOptions& options, Session& session) {
     Json all = Json::array();
     for (const std::string& file : options.files) {
         Json j = describe(file, options, session);
-        if (!session.json) {
-            for (const std::string& line : as_lines(j)) session.say(line);
-            if (options.validate && j.contains("departures") && j["departures"].empty())
-                session.say("departures from MRC2014: none");
-        }
-        if (options.isovalues) j["isovalues"] = isovalue_rows(file, options, session);
-        if (!session.json && file != options.files.back()) session.say("");
+        std::vector<std::string> lines = as_lines(j);
+        if (options.validate && j.contains("departures") && j["departures"].empty())
+            lines.emplace_back("departures from MRC2014: none");
+        if (options.isovalues) j["isovalues"] = isovalue_rows(file, options, lines, session);
+        if (file != options.files.back()) lines.emplace_back();
+        if (!session.json)
+            for (const std::string& line : lines) session.say(line);
         all.push_back(std::move(j));
     }
     session.result(all.size() == 1 ? all[0] : Json{{"files", all}});

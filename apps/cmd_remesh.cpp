@@ -7,6 +7,7 @@
 #include "vdbgeo/measure/requirements.h"
 #include "vdbgeo/remesh/delaunay_remesh.h"
 #include "vdbgeo/remesh/isotropic_remesh.h"
+#include "vdbgeo/surface/delaunay_surface.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -60,6 +61,21 @@ TriMesh by_isotropic(const RemeshOptions& o, const MeshWork& work) {
     return isotropic_remesh(work.in, options, work.progress);
 }
 
+/// Flags of another method than the one that runs.
+void refuse_others(const RemeshOptions& o, const CLI::App& app) {
+    const std::vector<std::string> lengths{"--min-length", "--max-length", "--error"};
+    if (o.method == "delaunay") {
+        refuse_flags(app, {"--length", "--iterations", "--feature-angle", "--adaptive"},
+                     "belongs to --method isotropic");
+        if (!have_delaunay()) throw UsageError("--method delaunay: this build has no CGAL");
+    } else {
+        refuse_flags(app, {"--angle", "--radius", "--distance", "--max-vertices", "--max-seconds"},
+                     "belongs to --method delaunay");
+    }
+    if (!o.adaptive) refuse_flags(app, lengths, "belongs to --adaptive");
+    if (o.adaptive) refuse_flags(app, {"--length"}, "--adaptive has lengths of its own");
+}
+
 void run_remesh(const RemeshOptions& o, Session& session) {
     run_mesh_command(o.files, "remeshing", session, [&o](const MeshWork& work) {
         work.json["method"] = o.method == "isotropic" && o.adaptive ? "adaptive" : o.method;
@@ -106,7 +122,8 @@ Command remesh_command() {
             app.add_option("--max-seconds", o->delaunay.max_seconds,
                            "delaunay: give up after this time, in seconds")
                 ->capture_default_str();
-            return [o](Session& session) {
+            return [o, flags = &app](Session& session) {
+                refuse_others(*o, *flags);
                 if (!o->adaptive && o->method == "isotropic") check_usage(o->isotropic);
                 run_remesh(*o, session);
             };

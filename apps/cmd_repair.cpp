@@ -49,13 +49,14 @@ void tell(const RepairReport& report, const Json& counts, Session& session) {
 }
 
 void run_repair(const RepairFlags& o, Session& session) {
+    RepairReport report;
     run_mesh_command(o.files, "repairing", session, [&](const MeshWork& work) {
         RepairResult result = repair(work.in, o.options, work.progress);
         work.json["repaired"] = report_json(result.report);
-        session.end_stage();
-        tell(result.report, work.json["repaired"], session);
+        report = result.report;
         return std::move(result.mesh);
     });
+    tell(report, report_json(report), session);
 }
 
 }  // namespace

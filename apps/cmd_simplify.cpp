@@ -50,7 +50,10 @@ Command simplify_command() {
                 return [o](Session& session) {
                     if (o->options.faces && o->ratio)
                         throw UsageError("--faces and --ratio both say how many");
-                    if (!o->ratio) check_usage(o->options);
+                    if (o->ratio && std::isnan(*o->ratio)) throw UsageError("--ratio: not a number");
+                    SimplifyOptions asked = o->options;
+                    if (o->ratio) asked.faces = 1;
+                    check_usage(asked);
                     run_simplify(*o, session);
                 };
             }};

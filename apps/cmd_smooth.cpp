@@ -53,7 +53,12 @@ Command smooth_command() {
                 ->capture_default_str();
             app.add_option("--time", o->diffusion.time, "diffusion: time, in Å^4")->capture_default_str();
             app.add_option("--steps", o->diffusion.steps, "diffusion: implicit steps")->capture_default_str();
-            return [o](Session& session) {
+            return [o, flags = &app](Session& session) {
+                if (o->method == "diffusion")
+                    refuse_flags(*flags, {"--iterations", "--lambda", "--pass-band"},
+                                 "belongs to --method taubin");
+                else
+                    refuse_flags(*flags, {"--time", "--steps"}, "belongs to --method diffusion");
                 check_usage(o->taubin);
                 check_usage(o->diffusion);
                 if (o->method == "diffusion" && o->diffusion.time == 0)

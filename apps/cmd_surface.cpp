@@ -23,6 +23,7 @@ struct SurfaceOptions {
     SurfaceFlags surface;
     ComponentFlags components;
     LabelSurfacesOptions label_options;
+    std::vector<std::int64_t> wanted;  ///< labels, none for all
 };
 
 /// "all", or numbers with commas between them.
@@ -81,10 +82,13 @@ void finish(const TriMesh& mesh, const SurfaceOptions& o, const Json& head,
 }
 
 /// All surfaces in one mesh, with the face property `label`.
-TriMesh join_labels(const std::vector<LabelSurface>& surfaces) {
+TriMesh join_labels(const std::vector<LabelSurface>& surfaces, const std::string& name) {
     TriMesh all;
     MeshProperty label{"label", 1, {}};
     for (const LabelSurface& s : surfaces) {
+        if (all.points.size() + s.mesh.points.size() > TriMesh::max_vertices)
+            throw InvalidInput(
+                fmt::format("{}: the labels' surfaces have more than 2^32-1 vertices together", name));
         const auto first = static_cast<VertexId>(all.points.size());
         all.points.insert(all.points.end(), s.mesh.points.begin(), s.mesh.points.end());
         for (const Triangle& t : s.mesh.triangles)
@@ -101,12 +105,12 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
             "{}: not a segmentation: its samples are not whole numbers, or there are too many different ones",
             o.in));
     LabelSurfacesOptions options = o.label_options;
-    options.labels = parse_labels(o.labels);
-    const auto surfaces =
-        naming(o.in, [&] { return label_surfaces(in.map, options, session.stage("surfaces")); });
+    options.labels = o.wanted;
+    auto surfaces = naming(o.in, [&] { return label_surfaces(in.map, options, session.stage("surfaces")); });
     Json rows = Json::array();
     std::vector<std::string> lines;
-    for (const LabelSurface& s : surfaces) {
+    for (LabelSurface& s : surfaces) {
+        if (o.components.any()) s.mesh = filter_components(s.mesh, o.components.filter);
         const MeshMeasures m = measure_mesh(s.mesh);
         rows.push_back({{"label", s.label},
                         {"components", m.components},
@@ -118,7 +122,12 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
                                     m.volume_A3 ? fmt::format("{:.6g} Å³", *m.volume_A3) : "open"));
     }
     if (surfaces.empty()) throw NumericalError(fmt::format("{}: there is no label but 0", o.in));
-    const TriMesh mesh = keep_pieces(join_labels(surfaces), o, session);
+    const TriMesh mesh = join_labels(surfaces, o.in);
+    if (mesh.empty())
+        throw NumericalError(fmt::format("{}: no piece of any label is left; drop fewer", o.in));
+    for (const char* ending : {".glb", ".obj", ".off", ".stl"})
+        if (has_ending(o.out, ending))
+            session.warn(fmt::format("{}: {} files do not keep which face is of which label", o.out, ending));
     finish(mesh, o, {{"method", "labels"}, {"labels", rows}}, lines, seconds, clock, session);
 }
 
@@ -160,9 +169,15 @@ Command surface_command() {
                     ->capture_default_str();
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);
-                return [o](Session& session) {
+                return [o, flags = &app](Session& session) {
                     o->map.finish();
-                    o->surface.finish();
+                    o->surface.finish(*flags);
+                    if (o->labels.empty()) {
+                        refuse_flags(*flags, {"--label-iterations"}, "belongs to --labels");
+                    } else {
+                        refuse_flags(*flags, {"--iso", "--method", "--cap"}, "means nothing with --labels");
+                        o->wanted = parse_labels(o->labels);
+                    }
                     check_usage(o->components.filter);
                     check_usage(o->label_options);
                     run_surface(*o, session);

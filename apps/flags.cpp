@@ -187,6 +187,11 @@ Isovalue IsoFlag::parse() const {
     }
 }
 
+void refuse_flags(const CLI::App& app, const std::vector<std::string>& names, const std::string& why) {
+    for (const std::string& name : names)
+        if (app.get_option(name)->count() > 0) throw UsageError(fmt::format("{}: {}", name, why));
+}
+
 void add_vdb_flags(CLI::App& app, VdbWriteOptions& options) {
     using Compression = VdbWriteOptions::Compression;
     static const std::map<std::string, Compression> names{

@@ -34,6 +34,9 @@ struct IsoFlag {
     Isovalue parse() const;
 };
 
+/// UsageError where one of these flags was given: `why` tells what it belongs to.
+void refuse_flags(const CLI::App& app, const std::vector<std::string>& names, const std::string& why);
+
 void add_vdb_flags(CLI::App& app, VdbWriteOptions& options);
 void add_render_flags(CLI::App& app, RenderOptions& options);
 

@@ -35,12 +35,18 @@ void run_mesh_command(const MeshCommandFlags& flags, const std::string& stage, S
     j.update(more);
     std::string distance;
     if (!flags.no_distance && !in.empty() && !out.empty()) {
-        const SurfaceDistance d = surface_distance(in, out, {}, session.stage("distance"));
-        j["hausdorff_A"] = d.hausdorff;
-        j["distance_to_result"] = one_sided_json(d.forward);
-        j["distance_to_input"] = one_sided_json(d.backward);
-        distance = fmt::format("distance    {:.4g} Å at most (Hausdorff), {:.4g} Å rms", d.hausdorff,
-                               std::max(d.forward.rms, d.backward.rms));
+        try {
+            const SurfaceDistance d = surface_distance(in, out, {}, session.stage("distance"));
+            j["hausdorff_A"] = d.hausdorff;
+            j["distance_to_result"] = one_sided_json(d.forward);
+            j["distance_to_input"] = one_sided_json(d.backward);
+            distance = fmt::format("distance    {:.4g} Å at most (Hausdorff), {:.4g} Å rms", d.hausdorff,
+                                   std::max(d.forward.rms, d.backward.rms));
+        } catch (const InvalidInput& e) {  // no reason to lose the result
+            session.end_stage();
+            session.warn(
+                fmt::format("{}: the distance to the result is not measured: {}", flags.in, e.what()));
+        }
     }
     seconds["measure"] = seconds["measure"].get<double>() + clock.lap();
     write_mesh(out, flags.out, {}, session.stage("writing"));

@@ -89,7 +89,7 @@ void SurfaceFlags::add(CLI::App& app) {
         ->capture_default_str();
 }
 
-void SurfaceFlags::finish() {
+void SurfaceFlags::finish(const CLI::App& app) {
     radius_in_A_ = parse_length("--radius", radius, delaunay.radius);
     distance_in_A_ = parse_length("--distance", distance, delaunay.distance);
     check_usage(delaunay);
@@ -98,6 +98,10 @@ void SurfaceFlags::finish() {
         throw UsageError("--method delaunay: this build has no CGAL");
     if (cap && method != "marching-cubes")
         throw UsageError(fmt::format("--cap: the {} surface is closed at the border by itself", method));
+    if (method != "dual") refuse_flags(app, {"--adaptivity", "--surface-mask"}, "belongs to --method dual");
+    if (method != "delaunay")
+        refuse_flags(app, {"--angle", "--radius", "--distance", "--max-vertices", "--max-seconds"},
+                     "belongs to --method delaunay");
 }
 
 /// A level set turned into a density: what is inside is above the isovalue.

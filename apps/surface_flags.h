@@ -28,8 +28,8 @@ struct SurfaceFlags {
     bool cap = false;
 
     void add(CLI::App& app);
-    /// Turns texts into options; throws UsageError.
-    void finish();
+    /// Turns texts into options; throws UsageError, for flags of another method too.
+    void finish(const CLI::App& app);
 
     /// The surface at `isovalue`: normals from dense to empty, and from inside out for a level set.
     TriMesh extract(const MapFile& in, double isovalue, const Progress& progress) const;

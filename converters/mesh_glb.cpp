@@ -399,6 +399,9 @@ void Reader::place(const Json& mesh, std::uint64_t number, const Mat4d& to_world
         if (mode != points && mode != triangles && mode != strip && mode != fan) continue;  // lines
         const Json& attributes = primitive["attributes"];
         if (!attributes.contains("POSITION")) continue;
+        for (const auto& [name, accessor] : attributes.items())
+            if (!accessor.is_number_integer())  // deep nesting, which dump() would follow, among others
+                fail(fmt::format("mesh {}: the attribute '{}' names no accessor", number, name));
         const auto [part, fresh] = parts.try_emplace(attributes.dump(), parts_.size());
         if (fresh) add_vertices(attributes, computed, to_world);
         if (mode != points) add_triangles(primitive, mode, parts_[part->second], mirrored);

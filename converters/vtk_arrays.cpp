@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "converters/mesh_formats.h"
 #include "converters/text_cursor.h"
@@ -191,8 +193,11 @@ class Decoder {
         std::string_view digits = word;
         if (digits.substr(0, 1) == "+") digits.remove_prefix(1);
         const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        // What is out of range of a float keeps the 0 that denormals are nearest to.
+        // Out of range of a float: too small, and 0 is nearest, or too large, and infinity is, which no mesh
+        // has.
         const bool range = error == std::errc::result_out_of_range && array_.type.kind == 'f';
+        if constexpr (std::is_floating_point_v<T>)
+            if (range) value = static_cast<T>(std::strtod(std::string(digits).c_str(), nullptr));
         if ((error != std::errc() && !range) || end != digits.data() + digits.size())
             fail(fmt::format("expected a number, found {}", in_quotes(word)));
         char bytes[sizeof(T)];

@@ -269,3 +269,23 @@ TEST_F(Surfaces, DistanceBetweenTwoMeshes) {
     EXPECT_LT(json({"measure", a, "--distance", a})["hausdorff_A"].get<double>(), 1e-9);
     expect_error(vdbgeo({"measure", a, b, "--distance", b}), 2, "--distance");
 }
+
+TEST_F(Surfaces, FlagsOfAnotherMethodAreRefused) {
+    const std::string map = phantom("a.mrc", 16), sphere = mesh("s.ply", icosphere(2, 10)), out = at("x.ply");
+    const std::vector<std::pair<Words, std::string>> wrong{
+        {{"surface", map, out, "--iso", "0", "--surface-mask", map}, "--surface-mask"},
+        {{"surface", map, out, "--iso", "0", "--angle", "20"}, "--angle"},
+        {{"surface", map, out, "--iso", "0", "--method", "delaunay", "--adaptivity", "1"}, "--adaptivity"},
+        {{"surface", map, out, "--label-iterations", "3"}, "--label-iterations"},
+        {{"surface", map, out, "--labels", "all", "--iso", "1"}, "--iso"},
+        {{"remesh", sphere, out, "--error", "0.1"}, "--error"},
+        {{"remesh", sphere, out, "--adaptive", "--length", "1"}, "--length"},
+        {{"remesh", sphere, out, "--radius", "1"}, "--radius"},
+        {{"smooth", sphere, out, "--time", "1"}, "--time"},
+        {{"smooth", sphere, out, "--method", "diffusion", "--time", "1", "--lambda", "0.4"}, "--lambda"}};
+    for (const auto& [words, flag] : wrong) {
+        SCOPED_TRACE(joined(words));
+        expect_error(vdbgeo(words), 2, flag);
+    }
+    EXPECT_FALSE(listing().count("x.ply"));
+}

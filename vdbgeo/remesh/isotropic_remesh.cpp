@@ -103,6 +103,23 @@ void check_size(double area, double length) {
                         length, faces));
 }
 
+/// The same for lengths that follow the curvature, one a vertex; dust has none.
+void check_size(const TriMesh& mesh, const std::vector<float>& lengths) {
+    double faces = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3d a = mesh.points[t[0]].cast<double>();
+        const double area =
+            0.5 * (mesh.points[t[1]].cast<double>() - a).cross(mesh.points[t[2]].cast<double>() - a).norm();
+        const double length = (double(lengths[t[0]]) + lengths[t[1]] + lengths[t[2]]) / 3;
+        if (length > 0) faces += area / (std::sqrt(3.0) / 4 * length * length);
+    }
+    if (faces > 3e8)
+        throw InvalidInput(
+            fmt::format("remesh: these lengths are about {:.1e} faces, more than 3e8; a greater error or "
+                        "least length is needed",
+                        faces));
+}
+
 }  // namespace
 
 void IsotropicRemeshOptions::check() const {
@@ -136,6 +153,7 @@ TriMesh isotropic_remesh(const TriMesh& mesh, const IsotropicRemeshOptions& opti
     const InputSurface input(mesh, adjacency, options.feature_angle_deg, length / 2);
     std::vector<float> lengths = options.adaptive ? curvature_lengths(input, *options.adaptive)
                                                   : std::vector<float>{static_cast<float>(length)};
+    if (options.adaptive) check_size(mesh, lengths);
     fit_to_pieces(mesh, adjacency, lengths);
     RemeshState state(input, lengths);
     progress.report(0.1);

@@ -45,7 +45,8 @@ class MapSolid final : public Solid {
 };
 
 /// Seeds on the parts of the box's border that lie inside: there the surface is the border.
-std::vector<Vec3d> border_seeds(const Frame& frame, const MapSolid& solid, double spacing) {
+std::vector<Vec3d> border_seeds(const Frame& frame, const MapSolid& solid, double spacing,
+                                std::uint64_t most) {
     std::vector<Vec3d> seeds;
     if (!frame.bounded()) return seeds;
     const Vec3d steps = frame.voxel_size() / solid.unit();
@@ -56,6 +57,9 @@ std::vector<Vec3d> border_seeds(const Frame& frame, const MapSolid& solid, doubl
             index[axis] = side * (frame.size[axis] - 1);
             const int nb = std::max(1, static_cast<int>((frame.size[b] - 1) * steps[b] / spacing)),
                       nc = std::max(1, static_cast<int>((frame.size[c] - 1) * steps[c] / spacing));
+            if (static_cast<double>(nb) * nc > 100.0 * static_cast<double>(most))
+                throw NumericalError(fmt::format(
+                    "a radius that small needs more than {} vertices: try a larger radius", most));
             for (int i = 0; i < nb; ++i)
                 for (int j = 0; j < nc; ++j) {
                     // Staggered, so that no four lie on a circle.
@@ -116,7 +120,7 @@ TriMesh delaunay_surface(const DensityMap& map, const DelaunaySurfaceOptions& op
     const MapSolid solid(map, options.isovalue, 0.5 * (low + high));
 
     ReferenceMesh mesh;
-    mesh.extra_seeds = border_seeds(map.frame, solid, 1.2 * options.radius);
+    mesh.extra_seeds = border_seeds(map.frame, solid, 1.2 * options.radius, options.max_vertices);
     if (reference.empty() && mesh.extra_seeds.empty()) return {};
     for (const Vec3f& p : reference.points) mesh.points.push_back(solid.from_world(p.cast<double>()));
     mesh.triangles = reference.triangles;

@@ -8,6 +8,7 @@
 
 #include "tests/support/grids.h"
 #include "tests/support/maps.h"
+#include "tests/support/sound_mesh.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
 
@@ -27,16 +28,6 @@ DualSurfaceOptions at(double isovalue, double adaptivity = 0) {
     options.isovalue = isovalue;
     options.adaptivity = adaptivity;
     return options;
-}
-
-MeshMeasures expect_closed_manifold(const TriMesh& mesh) {
-    const MeshMeasures m = measure_mesh(mesh);
-    EXPECT_TRUE(m.closed);
-    EXPECT_TRUE(m.oriented);
-    EXPECT_TRUE(m.manifold) << m.non_manifold_edges << " edges, " << m.non_manifold_vertices << " vertices";
-    EXPECT_EQ(m.unused_vertices, 0u);
-    EXPECT_NO_THROW(check(mesh, "dual"));
-    return m;
 }
 
 bool same(const TriMesh& a, const TriMesh& b) {

@@ -15,6 +15,7 @@
 #include "tests/support/data.h"
 #include "tests/support/grids.h"
 #include "tests/support/maps.h"
+#include "tests/support/sound_mesh.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/surface/label_cells.h"
@@ -38,16 +39,6 @@ LabelSurfacesOptions rounds(int iterations) {
     LabelSurfacesOptions options;
     options.iterations = iterations;
     return options;
-}
-
-MeshMeasures expect_closed_manifold(const TriMesh& mesh) {
-    const MeshMeasures m = measure_mesh(mesh);
-    EXPECT_TRUE(m.closed);
-    EXPECT_TRUE(m.oriented);
-    EXPECT_TRUE(m.manifold) << m.non_manifold_edges << " edges, " << m.non_manifold_vertices << " vertices";
-    EXPECT_EQ(m.unused_vertices, 0u);
-    EXPECT_NO_THROW(check(mesh, "label"));
-    return m;
 }
 
 /// Mean angle between the normals of neighbouring faces, degrees.

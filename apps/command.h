@@ -33,6 +33,9 @@ Command simplify_command();
 Command smooth_command();
 Command repair_command();
 Command measure_command();
+Command curvature_command();
+Command pockets_command();
+Command validate_command();
 Command render_command();
 Command model_command();
 

@@ -10,7 +10,7 @@
 #include "tests/support/meshes.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
-#include "vdbgeo/remesh/face_adjacency.h"
+#include "vdbgeo/core/face_adjacency.h"
 
 namespace vdbgeo {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "vdbgeo/core/tri_mesh.h"
-#include "vdbgeo/remesh/face_adjacency.h"
+#include "vdbgeo/core/face_adjacency.h"
 
 namespace vdbgeo {
 

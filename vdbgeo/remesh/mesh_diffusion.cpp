@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/remesh/vertex_neighbours.h"
+#include "vdbgeo/core/vertex_neighbours.h"
 
 namespace vdbgeo {
 namespace {

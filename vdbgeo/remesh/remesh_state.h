@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "vdbgeo/remesh/half_edge_mesh.h"
+#include "vdbgeo/core/half_edge_mesh.h"
 #include "vdbgeo/remesh/input_surface.h"
 
 namespace vdbgeo {

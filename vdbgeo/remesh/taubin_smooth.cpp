@@ -6,7 +6,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/remesh/vertex_neighbours.h"
+#include "vdbgeo/core/vertex_neighbours.h"
 
 namespace vdbgeo {
 namespace {

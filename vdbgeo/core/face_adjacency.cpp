@@ -1,4 +1,4 @@
-#include "vdbgeo/remesh/face_adjacency.h"
+#include "vdbgeo/core/face_adjacency.h"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@
 // clang-format on
 
 #include "vdbgeo/core/tri_mesh.h"
-#include "vdbgeo/remesh/face_adjacency.h"
+#include "vdbgeo/core/face_adjacency.h"
 
 namespace vdbgeo {
 

@@ -1,4 +1,4 @@
-#include "vdbgeo/remesh/vertex_neighbours.h"
+#include "vdbgeo/core/vertex_neighbours.h"
 
 #include <algorithm>
 

@@ -3,7 +3,7 @@
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 
-#include "vdbgeo/remesh/half_edge_mesh.h"
+#include "vdbgeo/core/half_edge_mesh.h"
 
 namespace vdbgeo {
 namespace {

@@ -1,0 +1,1 @@
+#include "apps/validate_tables.h"

@@ -1,0 +1,2 @@
+// The tables of the paper that validate reruns.
+#pragma once

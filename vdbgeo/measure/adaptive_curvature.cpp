@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/adaptive_curvature.h"
+
+namespace vdbgeo {}

@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/convex_hull.h"
+
+namespace vdbgeo {}

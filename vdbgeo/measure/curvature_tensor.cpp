@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/curvature_tensor.h"
+
+namespace vdbgeo {}

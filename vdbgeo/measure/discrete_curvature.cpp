@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/discrete_curvature.h"
+
+namespace vdbgeo {}

@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/field_curvature.h"
+
+namespace vdbgeo {}

@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/jet_curvature.h"
+
+namespace vdbgeo {}

@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/normal_voting.h"
+
+namespace vdbgeo {}

@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/pockets.h"
+
+namespace vdbgeo {}

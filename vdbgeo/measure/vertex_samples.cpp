@@ -1,0 +1,3 @@
+#include "vdbgeo/measure/vertex_samples.h"
+
+namespace vdbgeo {}

@@ -122,6 +122,10 @@ void put(TriMesh& mesh, const MeshProperty& property) {
 
 void run_curvature(const CurvatureOptions& o, Session& session) {
     check_mesh_output(o.out);
+    for (const char* ending : {".obj", ".off", ".stl"})
+        if (has_ending(o.out, ending))
+            session.warn(
+                fmt::format("{}: {} files hold no curvature; .ply, .vtp and .glb do", o.out, ending));
     Json seconds, j;
     Clock clock;
     TriMesh mesh = read_mesh(o.in, session.stage("reading"));

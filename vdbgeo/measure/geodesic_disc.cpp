@@ -53,30 +53,27 @@ void GeodesicDisc::spread(VertexId from) {
         if (!a_open && !b_open) continue;
         const Vec3d to_a = mesh_.points[a].cast<double>() - here;
         const Vec3d to_b = mesh_.points[b].cast<double>() - here;
-        if (a_open) offer(a, distance + to_a.norm());
-        if (b_open) offer(b, distance + to_b.norm());
-        if (distance == 0) continue;
-        if (a_open) cross(from, b, a, to_b, to_a);
-        if (b_open) cross(from, a, b, to_a, to_b);
+        const double length_a = to_a.norm(), length_b = to_b.norm();
+        if (a_open) offer(a, across(from, b, {length_b, length_a, to_a.dot(to_b)}));
+        if (b_open) offer(b, across(from, a, {length_a, length_b, to_a.dot(to_b)}));
     }
 }
 
-/// Unfolds a face: `from` is the origin, `beside` lies on the positive x axis, `to` above it, and what the
-/// two distances are measured from below it.
-void GeodesicDisc::cross(VertexId from, VertexId beside, VertexId to, const Vec3d& side, const Vec3d& way) {
-    const double length2 = side.squaredNorm();
-    if (!(length2 > 0)) return;
-    const double length = std::sqrt(length2);
-    const double near = distance_[from], other = distance_[beside];
-    const double source_x = (near * near - other * other + length2) / (2 * length);
+/// Unfolds a face: `from` is the origin, `beside` lies on the positive x axis, the third corner above it, and
+/// what the two distances are measured from below it.
+double GeodesicDisc::across(VertexId from, VertexId beside, const Corner& face) const {
+    const double near = distance_[from], along = near + face.third;
+    if (near == 0 || !known(beside) || !(face.beside > 0)) return along;
+    const double other = distance_[beside], length = face.beside;
+    const double source_x = (near * near - other * other + length * length) / (2 * length);
     const double source_y2 = near * near - source_x * source_x;
-    if (!(source_y2 > 0)) return;
-    const double to_x = way.dot(side) / length;
-    const double to_y = std::sqrt(std::max(0.0, way.squaredNorm() - to_x * to_x));
+    if (!(source_y2 > 0)) return along;
+    const double to_x = face.product / length;
+    const double to_y = std::sqrt(std::max(0.0, face.third * face.third - to_x * to_x));
     const double source_y = std::sqrt(source_y2), height = source_y + to_y;
-    const double crossing = source_x + (to_x - source_x) * source_y / height;
-    if (crossing < 0 || crossing > length) return;
-    offer(to, std::sqrt((to_x - source_x) * (to_x - source_x) + height * height));
+    const double crossing = source_x * height + (to_x - source_x) * source_y;
+    if (crossing < 0 || crossing > length * height) return along;
+    return std::sqrt((to_x - source_x) * (to_x - source_x) + height * height);
 }
 
 }  // namespace vdbgeo

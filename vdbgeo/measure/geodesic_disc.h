@@ -29,10 +29,16 @@ class GeodesicDisc {
     bool is_cap(std::uint32_t face) const { return caps_ && caps_[face] > 0.5f; }
 
  private:
+    /// The sides from one corner to the two others: lengths and product.
+    struct Corner {
+        double beside, third, product;
+    };
+
     bool known(VertexId v) const { return stamp_[v] == now_; }
     void offer(VertexId v, double distance);
     void spread(VertexId from);
-    void cross(VertexId from, VertexId beside, VertexId to, const Vec3d& side, const Vec3d& way);
+    /// The distance of a face's third corner, coming over the side between two others.
+    double across(VertexId from, VertexId beside, const Corner& face) const;
 
     const TriMesh& mesh_;
     const VertexFaces& faces_;

@@ -19,6 +19,9 @@ class TangentTensor {
         yz_ += scaled.y() * a.z();
         zz_ += scaled.z() * a.z();
     }
+    void scale(double by) {
+        for (double* entry : {&xx_, &xy_, &xz_, &yy_, &yz_, &zz_}) *entry *= by;
+    }
     Vec3d times(const Vec3d& a) const {
         return {xx_ * a.x() + xy_ * a.y() + xz_ * a.z(), xy_ * a.x() + yy_ * a.y() + yz_ * a.z(),
                 xz_ * a.x() + yz_ * a.y() + zz_ * a.z()};

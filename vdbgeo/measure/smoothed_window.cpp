@@ -108,6 +108,7 @@ void SmoothedView::smooth(int axis) {
 }
 
 void SmoothedView::move_to(const openvdb::Coord& corner) {
+    corner_ = corner;
     Vec3i low, size;
     for (int a = 0; a < 3; ++a) {
         const Axis& axis = axes_[static_cast<std::size_t>(a)];
@@ -120,6 +121,14 @@ void SmoothedView::move_to(const openvdb::Coord& corner) {
     gather(low, size);
     for (int a = 0; a < 3; ++a)
         if (axes_[static_cast<std::size_t>(a)].smoothed) smooth(a);
+}
+
+bool SmoothedView::holds(const Vec3d& index) const {
+    for (int a = 0; a < 3; ++a)
+        if (!(index[a] >= corner_[a] && index[a] < corner_[a] + edge_) || index[a] < range_.low[a] - 0.5 ||
+            index[a] > range_.high[a] + 0.5)
+            return false;
+    return true;
 }
 
 bool SmoothedView::derivatives(const Vec3d& index, Derivatives& out) const {

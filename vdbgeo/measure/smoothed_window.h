@@ -35,9 +35,10 @@ class SmoothedView {
     /// Edge of the cubes that fit the width: their places are [corner, corner + edge).
     static int edge_for(const Vec3d& sigma);
 
-    /// Reads the cube of edge() samples at `corner` and what lies around it.
+    /// Reads the cube at `corner` and what lies around it.
     void move_to(const openvdb::Coord& corner);
-    int edge() const { return edge_; }
+    /// Whether an index lies where derivatives may be asked for: in the cube.
+    bool holds(const Vec3d& index) const;
 
     /// At an index in the cube; false where an axis has fewer than three samples, or a sample in the window
     /// is not finite.
@@ -58,6 +59,7 @@ class SmoothedView {
     SampleRange range_;
     std::array<Axis, 3> axes_;
     int edge_;
+    openvdb::Coord corner_;
     Vec3i low_, size_;  // of what cube_ holds
     std::vector<double> cube_, other_;
     mutable std::vector<double> weights_;

@@ -233,8 +233,9 @@ Command pockets_command() {
                     ->excludes(protrusions);
                 app.add_option("--k1-above", p.k1_above, "Protrusions: k1 above this, in 1/Å [2 c]")
                     ->needs(protrusions);
-                app.add_option("--min-area", p.min_area,
-                               "Drop smaller patches, in Å² [1/s², s the larger of |bound| and c]");
+                app.add_option(
+                    "--min-area", p.min_area,
+                    "Drop smaller patches, in Å² [20 vertices', or 1/s², s the larger of |bound| and c]");
                 app.add_option("--min-persistence", p.min_persistence,
                                "Part patches at saddles of this depth in curvature, in 1/Å; inf: never [s]");
                 app.add_option("--ambient-radius", p.ambient_radius,

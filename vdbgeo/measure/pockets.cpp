@@ -21,6 +21,8 @@ namespace {
 constexpr std::uint32_t none = 0xFFFFFFFFu;
 /// Of the median curvedness: what pockets and protrusions are sharper than. Chosen by looking at maps.
 constexpr double pocket_share = 0.5, protrusion_share = 2;
+/// Patches of no more vertices are roughness.
+constexpr double few_vertices = 20;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::uint8_t left_out = curvature_border | curvature_cap | curvature_undefined;
 
@@ -29,13 +31,15 @@ struct Search {
     const TriMesh& mesh;
     const Curvatures& curvature;
     const PocketOptions& options;
-    bool pocket;
-    Array<double> areas, value;
+    bool pocket = options.kind == PatchKind::pocket;
+    Array<double> areas = vertex_areas(mesh);
+    Array<double> value{};
+    Array<double> excess{};  ///< over the bounds, the larger one: at most 0 in patches
     double level = 0;
 
-    std::vector<VertexId> vertices;    ///< in patches, rising
-    std::vector<std::uint32_t> patch;  ///< of each of them
-    std::vector<Pocket> list;          ///< by patch
+    std::vector<VertexId> vertices{};    ///< in patches, rising
+    std::vector<std::uint32_t> patch{};  ///< of each of them
+    std::vector<Pocket> list{};          ///< by patch
 
     void choose_bounds(Pockets& found);
     void find_vertices(double k1_below);
@@ -58,15 +62,20 @@ void Search::choose_bounds(Pockets& found) {
     level = pocket ? found.threshold : -found.threshold;
     found.k1_below = pocket ? options.k1_below.value_or(median) : infinity;
     const double sharp = std::max(std::abs(found.threshold), median);
-    found.min_area = options.min_area.value_or(sharp > 0 ? 1 / (sharp * sharp) : 0);
     found.min_persistence = options.min_persistence.value_or(sharp);
     found.area_A2 = std::accumulate(areas.begin(), areas.end(), 0.0);
+    const auto used = std::count_if(areas.begin(), areas.end(), [](double a) { return a > 0; });
+    const double few = used ? few_vertices * found.area_A2 / static_cast<double>(used) : 0;
+    found.min_area = options.min_area.value_or(sharp > 0 ? std::min(few, 1 / (sharp * sharp)) : few);
 }
 
 void Search::find_vertices(double k1_below) {
+    excess.resize(value.size());
+    parallel_for(value.size(), 1 << 12,
+                 [&](std::size_t v) { excess[v] = std::max(value[v] - level, curvature.k1[v] - k1_below); });
     for (std::size_t v = 0; v < value.size(); ++v)
-        if (value[v] < level && !(curvature.flags[v] & left_out) && std::isfinite(value[v]) &&
-            curvature.k1[v] <= k1_below)
+        if (value[v] < level && excess[v] <= 0 && !(curvature.flags[v] & left_out) &&
+            std::isfinite(curvature.k1[v]) && std::isfinite(curvature.k2[v]))
             vertices.push_back(static_cast<VertexId>(v));
 }
 
@@ -125,7 +134,7 @@ void Search::find_rims() {
     Array<std::uint32_t> numbers;
     numbers.assign(mesh.points.size(), 0);
     for (std::size_t i = 0; i < vertices.size(); ++i) numbers[vertices[i]] = patch[i] + 1;
-    const auto rims = patch_rims(mesh, numbers, static_cast<std::uint32_t>(list.size()), value, level);
+    const auto rims = patch_rims(mesh, numbers, static_cast<std::uint32_t>(list.size()), excess);
     for (std::size_t i = 0; i < list.size(); ++i) {
         list[i].rims = rims[i].loops;
         list[i].mouth_length_A = rims[i].length_A;
@@ -186,8 +195,7 @@ Pockets find_pockets(const TriMesh& mesh, const Curvatures& curvature, const Poc
                                        curvature.size(), mesh.points.size()));
     Pockets found;
     found.id.assign(mesh.points.size(), 0u);
-    Search search{mesh, curvature, options, options.kind == PatchKind::pocket, vertex_areas(mesh), {}, 0,
-                  {},   {},        {}};
+    Search search{mesh, curvature, options};
     search.choose_bounds(found);
     progress.report(0.2);
     search.find_vertices(found.k1_below);

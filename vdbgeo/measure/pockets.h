@@ -22,10 +22,10 @@ struct PocketOptions {
     std::optional<double> k1_below;
     /// Protrusions: k1 above this, 1/Å. None: 2 c.
     std::optional<double> k1_above;
-    /// Å²; none: 1/s², s the larger of |threshold| and c, which is a thirteenth of the area of a sphere of
-    /// curvature s: smaller patches are roughness.
+    /// Å²: smaller patches are roughness. None: the smaller of 1/s², s the larger of |threshold| and c, and
+    /// of 20 vertices' mean area.
     std::optional<double> min_area;
-    /// 1/Å; none: s. Patches that touch stay apart where both are deeper in curvature than the saddle between
+    /// 1/Å. None: s. Patches that touch stay apart where both are deeper in curvature than the saddle between
     /// them by this; 0 parts all minima, infinity none that touch.
     std::optional<double> min_persistence;
     /// Depth under the surface that a ball of this radius, Å, rolls on; none: under the convex hull.

@@ -32,7 +32,7 @@ void add_steps(const Triangle& t, const Array<std::uint32_t>& patch, std::vector
 }  // namespace
 
 std::vector<PatchRim> patch_rims(const TriMesh& mesh, const Array<std::uint32_t>& patch, std::uint32_t count,
-                                 const Array<double>& value, double level) {
+                                 const Array<double>& excess) {
     const MeshProperty* caps = mesh.find_face_property(cap_property);
     if (caps && caps->components != 1) caps = nullptr;
     std::vector<Step> steps;
@@ -48,8 +48,8 @@ std::vector<PatchRim> patch_rims(const TriMesh& mesh, const Array<std::uint32_t>
     std::sort(reached.begin(), reached.end());
     const auto place = [&](Cut cut) {
         const VertexId in = inner(cut), out = outer(cut);
-        const double a = value[in], b = value[out];
-        const double along = a < level && b > level ? (level - a) / (b - a) : 0.5;
+        const double a = excess[in], b = excess[out];
+        const double along = a <= 0 && b > 0 ? -a / (b - a) : 0.5;
         const Vec3d p = mesh.points[in].cast<double>();
         return Vec3d(p + along * (mesh.points[out].cast<double>() - p));
     };

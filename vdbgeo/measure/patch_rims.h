@@ -15,12 +15,12 @@ struct PatchRim {
 };
 
 /// The rims of patches 1 … count, `patch` of each vertex (0: none). A rim cuts the edges that leave its
-/// patch: where `value` of the inner and the outer end lie on both sides of `level`, at the place of the
-/// level between them; in the middle of the others. Loops run counter-clockwise as the patch is seen from
+/// patch: where `excess` changes sign, not above 0 at the inner end and above it at the outer one, at its
+/// zero between them; in the middle of the others. Loops run counter-clockwise as the patch is seen from
 /// outside, so that the area vector is that of any surface spanned by the loop, out of the mouth of a pit.
 /// Lines that end at a border of the mesh are closed by a straight one. Caps are no faces. Cost: O(n), and
 /// O(r log r) for r cut edges.
 std::vector<PatchRim> patch_rims(const TriMesh& mesh, const Array<std::uint32_t>& patch, std::uint32_t count,
-                                 const Array<double>& value, double level);
+                                 const Array<double>& excess);
 
 }  // namespace vdbgeo

@@ -25,7 +25,7 @@ constexpr double ambient_spacing = 0.125;
 /// pieces of the mesh are in its way, caps too; it rolls through borders wider than itself.
 ///
 /// C is known at its boundary points nearest to a cubic grid of ambient_spacing · radius, each exact up to
-/// rounding: depths come out too large by spacing²/(2 radius) or so, under 1 % of the radius, where the ball
+/// rounding: depths come out too large by spacing²/(2 radius) or so, 1 or 2 % of the radius, where the ball
 /// lies on a face, and by up to half the spacing where it is stuck between several.
 ///
 /// Throws InvalidInput for a radius that is not positive or so small beside the mesh that the grid would have

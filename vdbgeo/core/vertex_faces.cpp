@@ -1,6 +1,7 @@
 #include "vdbgeo/core/vertex_faces.h"
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -8,32 +9,46 @@
 namespace vdbgeo {
 namespace {
 
-constexpr std::size_t grain = 1 << 13;
+/// Every thread reads all faces; more than this many would only wait for memory.
+constexpr std::size_t most_ranges = 8;
+/// Vertices below which a second thread does not pay.
+constexpr std::size_t smallest_range = 1 << 14;
+
+/// Calls body(vertex, face) for the corners, in order of the faces, whose vertex is in [begin, end).
+template <class Body>
+void for_corners(const TriMesh& mesh, std::size_t begin, std::size_t end, const Body& body) {
+    const std::size_t length = end - begin;
+    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
+        const Triangle& t = mesh.triangles[f];
+        if (degenerate(t)) continue;
+        for (const VertexId v : t)
+            if (v - begin < length) body(v, static_cast<std::uint32_t>(f));
+    }
+}
 
 }  // namespace
 
 VertexFaces::VertexFaces(const TriMesh& mesh) : end_(mesh.points.size()) {
-    const std::size_t count = mesh.triangles.size();
-    if (count >= 0xFFFFFFFFull)
-        throw InvalidInput(fmt::format("mesh: {} faces, where fewer than 2^32-1 can be numbered", count));
-    const auto for_corners = [&](const auto& body) {
-        parallel_for(count, grain, [&](std::size_t f) {
-            const Triangle& t = mesh.triangles[f];
-            if (degenerate(t)) return;
-            for (const VertexId v : t) body(v, static_cast<std::uint32_t>(f));
-        });
-    };
-    for_corners([&](VertexId v, std::uint32_t) { end_[v].fetch_add(1, std::memory_order_relaxed); });
+    if (mesh.triangles.size() >= 0xFFFFFFFFull)
+        throw InvalidInput(
+            fmt::format("mesh: {} faces, where fewer than 2^32-1 can be numbered", mesh.triangles.size()));
+    // Each thread has its own range of vertices: nothing is shared, and the faces come in order by
+    // themselves.
+    const std::size_t threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+    const std::size_t ranges =
+        std::clamp<std::size_t>(end_.size() / smallest_range, 1, std::min(threads, most_ranges));
+    const std::size_t range = std::max<std::size_t>(1, (end_.size() + ranges - 1) / ranges);
+    parallel_blocks(end_.size(), range, [&](std::size_t begin, std::size_t end) {
+        std::fill(end_.begin() + static_cast<std::ptrdiff_t>(begin),
+                  end_.begin() + static_cast<std::ptrdiff_t>(end), std::uint64_t{0});
+        for_corners(mesh, begin, end, [&](VertexId v, std::uint32_t) { ++end_[v]; });
+    });
     std::uint64_t sum = 0;
-    for (auto& end : end_) sum += end.exchange(sum, std::memory_order_relaxed);
+    for (std::uint64_t& end : end_) sum += std::exchange(end, sum);
     faces_.resize(sum);
     // What counts up from the first place of each vertex ends at the first place of the next one.
-    for_corners(
-        [&](VertexId v, std::uint32_t f) { faces_[end_[v].fetch_add(1, std::memory_order_relaxed)] = f; });
-    parallel_for(end_.size(), grain, [&](std::size_t v) {
-        std::uint32_t* first = const_cast<std::uint32_t*>(begin(static_cast<VertexId>(v)));
-        std::uint32_t* last = const_cast<std::uint32_t*>(end(static_cast<VertexId>(v)));
-        if (!std::is_sorted(first, last)) std::sort(first, last);
+    parallel_blocks(end_.size(), range, [&](std::size_t begin, std::size_t end) {
+        for_corners(mesh, begin, end, [&](VertexId v, std::uint32_t f) { faces_[end_[v]++] = f; });
     });
 }
 

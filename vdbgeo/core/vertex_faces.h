@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <numeric>
 #include <vector>
@@ -24,15 +23,11 @@ class VertexFaces {
     explicit VertexFaces(const TriMesh& mesh);
 
     std::size_t vertices() const { return end_.size(); }
-    const std::uint32_t* begin(VertexId v) const {
-        return faces_.data() + (v == 0 ? 0 : end_[v - 1].load(std::memory_order_relaxed));
-    }
-    const std::uint32_t* end(VertexId v) const {
-        return faces_.data() + end_[v].load(std::memory_order_relaxed);
-    }
+    const std::uint32_t* begin(VertexId v) const { return faces_.data() + (v == 0 ? 0 : end_[v - 1]); }
+    const std::uint32_t* end(VertexId v) const { return faces_.data() + end_[v]; }
 
  private:
-    std::vector<std::atomic<std::uint64_t>> end_;  // of each vertex's faces
+    Array<std::uint64_t> end_;  // of each vertex's faces
     Array<std::uint32_t> faces_;
 };
 

@@ -1,89 +1,19 @@
 #include "vdbgeo/measure/curvature.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
-#include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/core/vertex_faces.h"
+#include "vdbgeo/measure/one_ring.h"
 #include "vdbgeo/measure/shape_types.h"
 
 namespace vdbgeo {
 namespace {
 
 constexpr std::size_t grain = 1 << 12;
-/// Spacing of floats over mean edge above which a mesh's shape is lost in rounding.
-constexpr double coarsest_rounding = 0.01;
-
-bool is_cap(const MeshProperty* caps, std::size_t face) { return caps && caps->values[face] > 0.5f; }
-
-void check_precision(const TriMesh& mesh, const char* stage) {
-    struct Sums {
-        double length = 0, largest = 0;
-    };
-    const Sums sums = fixed_order_reduce(
-        mesh.triangles.size(), grain, Sums{},
-        [&](std::size_t begin, std::size_t end) {
-            Sums s;
-            for (std::size_t f = begin; f < end; ++f)
-                for (std::size_t k = 0; k < 3; ++k) {
-                    const Vec3d a = mesh.points[mesh.triangles[f][k]].cast<double>();
-                    s.length += (mesh.points[mesh.triangles[f][(k + 1) % 3]].cast<double>() - a).norm();
-                    s.largest = std::max(s.largest, a.cwiseAbs().maxCoeff());
-                }
-            return s;
-        },
-        [](Sums& to, const Sums& part) {
-            to.length += part.length;
-            to.largest = std::max(to.largest, part.largest);
-        });
-    const double edge = sums.length / (3 * static_cast<double>(mesh.triangles.size()));
-    const float largest = static_cast<float>(sums.largest);
-    const double spacing = std::nextafter(largest, std::numeric_limits<float>::infinity()) - largest;
-    if (spacing > coarsest_rounding * edge)
-        throw InvalidInput(fmt::format(
-            "{}: coordinates up to {:.6g} Å are rounded to {:.2g} Å, and edges are {:.3g} Å long on average: "
-            "too coarse for curvature; move the mesh to the origin before it is written",
-            stage, sums.largest, spacing, edge));
-}
-
-/// The flags of v, and whether an edge of v has two faces that run through it in the same direction.
-std::uint8_t flags_of(const TriMesh& mesh, const MeshProperty* caps, VertexStar& star, bool& misoriented) {
-    bool area = false, any = false, cap = true, border = false, bad = false;
-    for (std::uint32_t s = 0; s < star.face_count(); ++s) {
-        any = true;
-        if (is_cap(caps, star.face(s))) continue;
-        cap = false;
-        const Triangle& t = mesh.triangles[star.face(s)];
-        const Vec3d a = mesh.points[t[0]].cast<double>();
-        area |= (mesh.points[t[1]].cast<double>() - a).cross(mesh.points[t[2]].cast<double>() - a).norm() > 0;
-    }
-    if (any && cap) return curvature_cap | curvature_undefined;
-    std::uint32_t kept = 0;
-    star.for_each_edge([&](const VertexStar::Spoke* first, const VertexStar::Spoke* last) {
-        const VertexStar::Spoke* faces[2];
-        int count = 0;
-        for (const VertexStar::Spoke* s = first; s != last; ++s)
-            if (!is_cap(caps, star.face(s->slot))) {
-                if (count < 2) faces[count] = s;
-                ++count;
-            }
-        border |= count == 1;
-        bad |= count > 2;
-        if (count == 2) {
-            misoriented |= faces[0]->out == faces[1]->out;
-            star.join(faces[0]->slot, faces[1]->slot);
-        }
-    });
-    for (std::uint32_t s = 0; s < star.face_count(); ++s)
-        kept += !is_cap(caps, star.face(s)) && star.fan(s) == s;
-    std::uint8_t flags = border ? curvature_border : 0;
-    if (!area || bad || kept != 1) flags |= curvature_undefined;
-    return flags;
-}
 
 void put(TriMesh& mesh, MeshProperty property) {
     for (MeshProperty& p : mesh.vertex_properties)
@@ -173,27 +103,23 @@ void attach(TriMesh& mesh, const Curvatures& c, double flatness) {
 }
 
 Array<std::uint8_t> curvature_flags(const TriMesh& mesh, const char* stage) {
-    check(mesh, stage);
-    if (!mesh.empty()) check_precision(mesh, stage);
-    const VertexFaces faces(mesh);
-    const MeshProperty* caps = mesh.find_face_property(cap_property);
-    if (caps && caps->components != 1) caps = nullptr;
+    check_curvature_input(mesh, stage);
+    return curvature_flags(mesh, VertexFaces(mesh), stage);
+}
+
+Array<std::uint8_t> curvature_flags(const TriMesh& mesh, const VertexFaces& faces, const char* stage) {
     Array<std::uint8_t> flags(mesh.points.size());
     std::atomic<std::uint64_t> misoriented{0};
     parallel_blocks(flags.size(), grain, [&](std::size_t begin, std::size_t end) {
-        VertexStar star;
+        OneRing ring(mesh, faces);
+        std::uint64_t turned = 0;
         for (std::size_t v = begin; v < end; ++v) {
-            star.fill(mesh, faces, static_cast<VertexId>(v));
-            bool turned = false;
-            flags[v] = flags_of(mesh, caps, star, turned);
-            if (turned) misoriented.fetch_add(1, std::memory_order_relaxed);
+            ring.fill(static_cast<VertexId>(v));
+            flags[v] = ring.flags(ring.has_area(), turned);
         }
+        misoriented.fetch_add(turned, std::memory_order_relaxed);
     });
-    if (misoriented > 0)
-        throw InvalidInput(fmt::format(
-            "{}: the sign of curvature needs faces that are turned the same way, but at {} vertices two run "
-            "through an edge in the same direction; try repair (a Möbius strip has no outside)",
-            stage, misoriented.load()));
+    check_oriented(misoriented, stage);
     return flags;
 }
 

@@ -8,6 +8,8 @@
 
 namespace vdbgeo {
 
+class VertexFaces;
+
 /// What there is to know of a vertex before its curvature is trusted; bits of Curvatures::flags.
 enum CurvatureFlag : std::uint8_t {
     curvature_border = 1,  ///< on an edge of one face, caps not counted: seen from one side only
@@ -54,5 +56,8 @@ void attach(TriMesh& mesh, const Curvatures& curvature, double flatness = 0);
 /// over: curvature has no sign there; the message says to repair), and where coordinates are so large that
 /// 32-bit floats leave no shape: spacing of floats at the largest coordinate above 1/100 of the mean edge.
 Array<std::uint8_t> curvature_flags(const TriMesh& mesh, const char* stage);
+/// The same for a mesh that has been checked and whose faces at the vertices are known: throws only for faces
+/// in the same direction. Curvature by `check_curvature_input` and this needs the list once.
+Array<std::uint8_t> curvature_flags(const TriMesh& mesh, const VertexFaces& faces, const char* stage);
 
 }  // namespace vdbgeo

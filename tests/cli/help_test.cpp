@@ -7,9 +7,9 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info",    "convert",    "phantom", "denoise",  "edges",  "transform",
-                         "flow",    "surface",    "remesh",  "simplify", "smooth", "repair",
-                         "measure", "components", "render",  "model"};
+const Words all_commands{"info",    "convert",    "phantom",  "denoise",  "edges",  "transform",
+                         "flow",    "surface",    "remesh",   "simplify", "smooth", "repair",
+                         "measure", "components", "validate", "render",   "model"};
 
 struct Promise {
     const char* command;
@@ -37,6 +37,7 @@ const std::vector<Promise> promises{
     {"repair", {"--max-hole UINT=1000"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
+    {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
 

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_builder.h"
 
 namespace vdbgeo {
 namespace {
@@ -269,6 +270,50 @@ AnalyticPatch analytic_patch(const AnalyticPatchOptions& o) {
     }
     patch.longest_edge = longest_edge(patch.mesh.points, patch.mesh.triangles, o.radius);
     return patch;
+}
+
+DensityMap patch_map(PatchShape shape, double spacing, double radius) {
+    if (!(spacing > 0 && spacing <= 0.1 && radius > 0 && radius <= 0.3))
+        throw InvalidInput(
+            fmt::format("a map of a patch of {} Å every {} Å: at most 0.3 every 0.1", radius, spacing));
+    constexpr int beyond = 6;
+    // Within the radius every shape stays below 0.6 r² of the plane z = 0.
+    const int wide = static_cast<int>(std::ceil(radius / spacing)) + beyond;
+    const int high = static_cast<int>(std::ceil(0.6 * radius * radius / spacing)) + beyond;
+    const Vec3i half(wide, wide, high), size = 2 * half + Vec3i::Ones();
+    Frame frame;
+    frame.axes = spacing * Mat3d::Identity();
+    frame.origin = -spacing * half.cast<double>();
+    GridBuilder builder(size, {0, 1, 2});
+    std::vector<float> samples(static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) *
+                               static_cast<std::size_t>(size.z()));
+    std::size_t k = 0;
+    for (int z = 0; z < size.z(); ++z)
+        for (int y = 0; y < size.y(); ++y)
+            for (int x = 0; x < size.x(); ++x)
+                samples[k++] = static_cast<float>(patch_field(shape, frame.to_world(Vec3d(x, y, z))));
+    builder.add_sections(samples.data(), size.z());
+    return builder.finish(frame);
+}
+
+CurvatureErrors curvature_errors(const AnalyticPatch& patch, const Curvatures& estimate) {
+    CurvatureErrors e;
+    for (const VertexId v : patch.measured) {
+        if (!estimate.defined(v)) {
+            const double none = std::numeric_limits<double>::infinity();
+            return {none, none, none, none};
+        }
+        const double k = std::abs(estimate.K[v] - patch.exact.K[v]);
+        const double h = std::abs(estimate.H[v] - patch.exact.H[v]);
+        e.K_max = std::max(e.K_max, k);
+        e.H_max = std::max(e.H_max, h);
+        e.K_rms += k * k;
+        e.H_rms += h * h;
+    }
+    const double count = static_cast<double>(patch.measured.size());
+    e.K_rms = std::sqrt(e.K_rms / count);
+    e.H_rms = std::sqrt(e.H_rms / count);
+    return e;
 }
 
 TriMesh geodesic_sphere(double radius, int frequency) {

@@ -5,6 +5,7 @@
 
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/measure/curvature.h"
+#include "vdbgeo/volume/density_map.h"
 
 namespace vdbgeo {
 
@@ -62,6 +63,18 @@ struct AnalyticPatch {
 /// jitter) of a vertex's place those are taken that lie so near to the surface that least is lost: some 1e-11
 /// Å off. Throws InvalidInput for options that check() refuses. Cost: some 10 µs a vertex.
 AnalyticPatch analytic_patch(const AnalyticPatchOptions& options);
+
+/// The field of a shape sampled every `spacing` Å (up to 0.1), in a box that reaches six samples beyond the
+/// part of a patch within the radius.
+DensityMap patch_map(PatchShape shape, double spacing, double radius);
+
+/// Errors of an estimate over the measured vertices: the largest, and the root of the mean square.
+struct CurvatureErrors {
+    double K_max = 0, K_rms = 0, H_max = 0, H_rms = 0;
+};
+
+/// Infinite where a measured vertex has no value.
+CurvatureErrors curvature_errors(const AnalyticPatch& patch, const Curvatures& estimate);
 
 /// Exact curvature of a graph at a point, into element v: K and H by the derivatives, principal values and
 /// directions from the two fundamental forms; the sign is that of a specimen below.

@@ -15,36 +15,71 @@ struct ValidateOptions {
     bool quick = false;
 };
 
-/// Fixed where the number is near 1, so that digits can be compared with the paper's; else three places.
+/// Errors to four digits; values near 1 with the places that the paper prints.
 std::string number(double value, bool error) {
     return error ? fmt::format("{:.3e}", value) : fmt::format("{:.6f}", value);
 }
 
-std::string order_text(const std::optional<double>& order) {
-    return order ? fmt::format("({:.2f})", *order) : "";
+std::string with_order(const std::string& value, const std::optional<double>& order) {
+    return value + (order ? fmt::format(" ({:5.2f})", *order) : "");
 }
 
-/// A table as lines: first what and how, then for each number the paper's, ours, and the theory's.
-void say_table(const ValidatedTable& table, Session& session) {
-    const bool numbered = std::isdigit(static_cast<unsigned char>(table.name[0])) != 0;
-    const bool errors =
-        table.name == "5" || table.name == "6" || table.name == "patches" || table.name == "irregular";
-    session.say(fmt::format("{}: {}", numbered ? "Table " + table.name : table.name, table.title));
-    std::size_t subject = 0, method = 0;
+/// Columns of a table: a heading, and one text a row.
+struct Column {
+    std::string heading;
+    std::vector<std::string> cells;
+};
+
+std::vector<Column> columns_of(const ValidatedTable& table) {
+    const bool errors = table.rows.front().values.front().name.find(" L") != std::string::npos;
+    std::vector<Column> columns{{"", {}}, {"", {}}};
     for (const ValidatedRow& row : table.rows) {
-        subject = std::max(subject, row.subject.size());
-        method = std::max(method, row.method.size());
+        columns[0].cells.push_back(row.subject);
+        columns[1].cells.push_back(row.method);
     }
-    for (const ValidatedRow& row : table.rows) {
-        std::string line = fmt::format("  {:<{}}  {:<{}}", row.subject, subject, row.method, method);
-        for (const ValidatedValue& v : row.values) {
-            line += fmt::format("  {} ", v.name);
-            if (v.paper)
-                line += fmt::format("paper {}{} ours ", number(*v.paper, errors), order_text(v.paper_order));
-            line += number(v.ours, errors) + order_text(v.order);
-            if (v.theory) line += " of " + number(*v.theory, errors);
-            if (!v.fault.empty()) line += " WORSE";
+    const auto add = [&](const std::string& heading, const auto& text) {
+        columns.push_back({heading, {}});
+        for (const ValidatedRow& row : table.rows) columns.back().cells.push_back(text(row));
+    };
+    for (std::size_t k = 0; k < table.rows.front().values.size(); ++k) {
+        const ValidatedValue& first = table.rows.front().values[k];
+        if (first.theory)
+            add(first.name + ": theory",
+                [&](const ValidatedRow& r) { return number(*r.values[k].theory, errors); });
+        if (first.paper)
+            add(first.theory ? "paper" : first.name + ": paper", [&](const ValidatedRow& r) {
+                return with_order(number(*r.values[k].paper, errors), r.values[k].paper_order);
+            });
+        add(first.theory || first.paper ? "ours" : first.name, [&](const ValidatedRow& r) {
+            const ValidatedValue& v = r.values[k];
+            return with_order(number(v.ours, errors), v.order) + (v.fault.empty() ? "" : " WORSE");
+        });
+    }
+    return columns;
+}
+
+/// Characters on the terminal: bytes that begin one in UTF-8.
+std::size_t width_of(const std::string& text) {
+    return static_cast<std::size_t>(
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+}
+
+void say_table(const ValidatedTable& table, Session& session) {
+    const bool numbered = table.name.size() == 1;
+    session.say(fmt::format("{}: {}", numbered ? "Table " + table.name : table.name, table.title));
+    const std::vector<Column> columns = columns_of(table);
+    std::vector<std::string> lines(table.rows.size() + 1);
+    for (const Column& column : columns) {
+        std::size_t width = width_of(column.heading);
+        for (const std::string& cell : column.cells) width = std::max(width, width_of(cell));
+        if (width == 0) continue;
+        for (std::size_t r = 0; r < lines.size(); ++r) {
+            const std::string& cell = r == 0 ? column.heading : column.cells[r - 1];
+            lines[r] += "  " + cell + std::string(width - width_of(cell), ' ');
         }
+    }
+    for (std::string& line : lines) {
+        line.erase(line.find_last_not_of(' ') + 1);
         session.say(line);
     }
     session.say("");

@@ -38,7 +38,7 @@ std::string radius_name(int squared) {
 struct SphereFigures {
     int squared_radius;
     double area, volume;
-    int frequency;          ///< of the geodesic sphere, whose edges are 0.124 Å at most in root mean square
+    int frequency;  ///< of the geodesic sphere: its area is at most as far from the sphere's as the paper's
     double barycentric[4];  ///< Table 3: mean and spread of K, of H
     double voronoi[4];      ///< Table 4
 };
@@ -49,7 +49,7 @@ const SphereFigures spheres[] = {
     {3,
      37.66,
      21.72,
-     17,
+     18,
      {0.333685, 0.009292, 0.577343, 0.010881},
      {0.333684, 0.007158, 0.577343, 0.005481}}};
 
@@ -136,20 +136,40 @@ ValidatedTable table_3_or_4(bool voronoi) {
 
 // ---- Tables 5 and 6, and the patches of the other types
 
-/// Tables 5 and 6 at the four edge lengths.
-struct PatchFigures {
-    double largest[4], largest_order[4], l2[4], l2_order[4];
+/// One error norm of Tables 5 and 6 at the four edge lengths.
+struct Norm {
+    const char* name;
+    double CurvatureErrors::*error;
+    bool gaussian, largest;
+    double paper[4], paper_order[4];
 };
-const PatchFigures paper_K{{8.325e-3, 2.676e-3, 1.031e-3, 4.544e-4},
-                           {0, 1.64, 1.38, 1.18},
-                           {4.815e-3, 1.149e-3, 2.803e-4, 6.920e-5},
-                           {0, 2.07, 2.04, 2.02}};
-const PatchFigures paper_H{{1.275e-3, 3.441e-4, 8.820e-5, 2.226e-5},
-                           {0, 1.89, 1.96, 1.99},
-                           {5.228e-4, 1.409e-4, 3.623e-5, 9.167e-6},
-                           {0, 1.89, 1.96, 1.98}};
+const Norm norms[] = {{"K L∞",
+                       &CurvatureErrors::K_max,
+                       true,
+                       true,
+                       {8.325e-3, 2.676e-3, 1.031e-3, 4.544e-4},
+                       {0, 1.64, 1.38, 1.18}},
+                      {"K L2",
+                       &CurvatureErrors::K_rms,
+                       true,
+                       false,
+                       {4.815e-3, 1.149e-3, 2.803e-4, 6.920e-5},
+                       {0, 2.07, 2.04, 2.02}},
+                      {"H L∞",
+                       &CurvatureErrors::H_max,
+                       false,
+                       true,
+                       {1.275e-3, 3.441e-4, 8.820e-5, 2.226e-5},
+                       {0, 1.89, 1.96, 1.99}},
+                      {"H L2",
+                       &CurvatureErrors::H_rms,
+                       false,
+                       false,
+                       {5.228e-4, 1.409e-4, 3.623e-5, 9.167e-6},
+                       {0, 1.89, 1.96, 1.98}}};
 
 enum class Method { voronoi, jets, field, adaptive };
+constexpr Method methods[] = {Method::voronoi, Method::jets, Method::field, Method::adaptive};
 
 std::string name_of(Method method) {
     switch (method) {
@@ -190,25 +210,30 @@ CurvatureErrors errors_of(Method method, const AnalyticPatch& patch, const Analy
     return {};
 }
 
-/// The paper meshed its sphere unevenly: its errors of H, which on a sphere come from uneven rings alone,
-/// tell.
-double jitter_of(PatchShape shape) { return shape == PatchShape::peak || shape == PatchShape::pit ? 0.2 : 0; }
+/// Part of an edge that vertices are moved by, where rings are uneven.
+constexpr double uneven = 0.2;
 
-/// What is asked of a method: errors of the paper's size, and orders.
+/// The paper's sphere was meshed unevenly: on a sphere with even rings H by Eq 15 has no error of its order.
+double jitter_of(PatchShape shape) {
+    return shape == PatchShape::peak || shape == PatchShape::pit ? uneven : 0;
+}
+
+/// What is asked of a method beside being shown: errors of at most the paper's, orders of root mean squares,
+/// and both of the largest error of K.
 struct Bars {
-    bool errors = true, l2_order = true, largest_K_order = false;
+    bool errors = false, l2_order = false, largest_K = false;
 };
 
+/// The field's errors are those of its gaussian, of second order too, but larger: shown, not judged.
 Bars bars_of(Method method) {
     switch (method) {
         case Method::voronoi:
             return {true, true, false};
         case Method::jets:
-            return {true, true, true};
+            return {false, true, true};
         case Method::field:
-            return {false, true, false};
         case Method::adaptive:
-            return {false, false, false};
+            return {};
     }
     return {};
 }
@@ -220,20 +245,27 @@ struct Series {
     Bars bars;
 };
 
-/// One error with its order and, where the series is to be judged, its faults.
-ValidatedValue judged(const std::string& name, double ours, const double* before, bool hold_error,
-                      double limit, std::optional<double> order_bar) {
-    ValidatedValue v{name, ours, {}, {}, {}, {}, ""};
-    if (before) v.order = std::log2(*before / ours);
-    if (hold_error && !(ours <= limit))
-        v.fault = fmt::format("{:.4g}, the paper {:.4g}", ours, limit);
-    else if (v.order && order_bar && ours > rounding_floor && !(*v.order >= *order_bar))
-        v.fault = fmt::format("of order {:.2f}, below {}", *v.order, *order_bar);
-    return v;
+/// Which numbers of a series a table shows.
+struct Shown {
+    bool K = true, H = true, paper = false;
+};
+
+/// What is wrong with an error of this size and order; empty: nothing.
+std::string fault_of(const Norm& norm, const Bars& bars, double limit, double ours,
+                     std::optional<double> order) {
+    const bool largest_K = norm.largest && norm.gaussian;
+    if ((bars.errors || (bars.largest_K && largest_K)) && !(ours <= limit))
+        return fmt::format("{:.4g}, the paper {:.4g}", ours, limit);
+    double bar = 0;
+    if (bars.l2_order && !norm.largest) bar = least_order;
+    if (bars.largest_K && largest_K) bar = least_order_largest;
+    if (bar > 0 && order && ours > rounding_floor && !(*order >= bar))
+        return fmt::format("of order {:.2f}, below {}", *order, bar);
+    return "";
 }
 
-/// The rows of a series, one an edge length; `with_paper` shows the paper's figures beside.
-void add_series(ValidatedTable& table, const Series& s, std::size_t levels, bool K, bool H, bool with_paper) {
+/// The rows of a series, one an edge length.
+void add_series(ValidatedTable& table, const Series& s, std::size_t levels, const Shown& shown) {
     CurvatureErrors before;
     for (std::size_t level = 0; level < levels; ++level) {
         AnalyticPatchOptions options;
@@ -242,64 +274,70 @@ void add_series(ValidatedTable& table, const Series& s, std::size_t levels, bool
         options.jitter = s.jitter;
         const CurvatureErrors e = errors_of(s.method, analytic_patch(options), options);
         ValidatedRow row{fmt::format("{}, edges {}", name_of(s.shape), edges[level]), name_of(s.method), {}};
-        const auto add = [&](const char* name, const PatchFigures& paper, bool largest,
-                             double CurvatureErrors::*of, bool order_held) {
-            ValidatedValue v =
-                judged(name, e.*of, level > 0 ? &(before.*of) : nullptr, s.bars.errors,
-                       largest ? paper.largest[level] : paper.l2[level],
-                       order_held ? std::optional<double>(largest ? least_order_largest : least_order)
-                                  : std::nullopt);
-            if (with_paper) {
-                v.paper = largest ? paper.largest[level] : paper.l2[level];
-                if (level > 0) v.paper_order = largest ? paper.largest_order[level] : paper.l2_order[level];
-            }
+        for (const Norm& norm : norms) {
+            if (!(norm.gaussian ? shown.K : shown.H)) continue;
+            ValidatedValue v;
+            v.name = norm.name;
+            v.ours = e.*norm.error;
+            if (level > 0) v.order = std::log2(before.*norm.error / v.ours);
+            if (shown.paper) v.paper = norm.paper[level];
+            if (shown.paper && level > 0) v.paper_order = norm.paper_order[level];
+            v.fault = fault_of(norm, s.bars, norm.paper[level], v.ours, v.order);
             row.values.push_back(std::move(v));
-        };
-        if (K) add("K L∞", paper_K, true, &CurvatureErrors::K_max, s.bars.largest_K_order);
-        if (K) add("K L2", paper_K, false, &CurvatureErrors::K_rms, s.bars.l2_order);
-        if (H) add("H L∞", paper_H, true, &CurvatureErrors::H_max, false);
-        if (H) add("H L2", paper_H, false, &CurvatureErrors::H_rms, s.bars.l2_order);
+        }
         table.rows.push_back(std::move(row));
         before = e;
     }
 }
 
-ValidatedTable table_5_or_6(bool gaussian, std::size_t levels) {
+void add_all(ValidatedTable& table, const std::vector<Series>& all, std::size_t levels, const Shown& shown,
+             const Progress& progress) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        progress.report(static_cast<double>(k) / static_cast<double>(all.size()));
+        add_series(table, all[k], levels, shown);
+    }
+}
+
+ValidatedTable table_5_or_6(bool gaussian, std::size_t levels, const Progress& progress) {
     ValidatedTable table{
         gaussian ? "5" : "6",
-        fmt::format("{} curvature on a patch of the unit sphere, against the longest edge (Å)",
-                    gaussian ? "Gaussian" : "mean"),
+        fmt::format(
+            "{} curvature on a patch of the unit sphere, against the longest edge in Å; errors and, in "
+            "brackets, orders",
+            gaussian ? "Gaussian" : "mean"),
         {}};
-    for (const Method method : {Method::voronoi, Method::jets, Method::field})
-        add_series(table, {PatchShape::peak, jitter_of(PatchShape::peak), method, bars_of(method)}, levels,
-                   gaussian, !gaussian, true);
+    std::vector<Series> all;
+    for (const Method method : methods)
+        all.push_back({PatchShape::peak, jitter_of(PatchShape::peak), method, bars_of(method)});
+    add_all(table, all, levels, {gaussian, !gaussian, true}, progress);
     return table;
 }
 
-ValidatedTable patches_table(std::size_t levels) {
+ValidatedTable patches_table(std::size_t levels, const Progress& progress) {
     ValidatedTable table{"patches", "patches of the other types; held against Tables 5 and 6", {}};
+    std::vector<Series> all;
     for (const PatchShape shape :
          {PatchShape::pit, PatchShape::saddle_ridge, PatchShape::saddle_valley, PatchShape::minimal,
           PatchShape::torus_outside, PatchShape::torus_inside, PatchShape::ridge, PatchShape::valley})
-        for (const Method method : {Method::voronoi, Method::jets, Method::field})
-            add_series(table, {shape, jitter_of(shape), method, bars_of(method)}, levels, true, true, false);
+        for (const Method method : methods) all.push_back({shape, jitter_of(shape), method, bars_of(method)});
+    add_all(table, all, levels, {}, progress);
     return table;
 }
 
-/// Where the one-ring formulas do not converge: shown, not judged, but for the jets.
-ValidatedTable irregular_table(std::size_t levels) {
+/// Where the one-ring formulas do not converge: they are shown, the jets judged.
+ValidatedTable irregular_table(std::size_t levels, const Progress& progress) {
     ValidatedTable table{
-        "irregular", "the same patches from uneven rings: one-ring formulas do not converge there", {}};
+        "irregular", "patches with uneven rings, where one-ring formulas do not converge", {}};
+    std::vector<Series> all;
     for (const PatchShape shape : {PatchShape::saddle_ridge, PatchShape::minimal, PatchShape::torus_inside})
-        for (const Method method : {Method::voronoi, Method::jets}) {
-            const Bars bars = method == Method::jets ? bars_of(method) : Bars{false, false, false};
-            add_series(table, {shape, 0.2, method, bars}, levels, true, true, false);
-        }
+        for (const Method method : methods)
+            all.push_back({shape, uneven, method, method == Method::voronoi ? Bars{} : bars_of(method)});
+    add_all(table, all, levels, {}, progress);
     return table;
 }
 
 /// What a user gets: a map, marching cubes, even triangles, curvature.
-ValidatedTable maps_table(bool quick) {
+ValidatedTable maps_table(bool quick, const Progress& progress) {
     ValidatedTable table{
         "maps",
         "spheres from maps sampled every 0.05 Å, marching cubes, remeshed to edges of 0.12 Å; means "
@@ -308,6 +346,7 @@ ValidatedTable maps_table(bool quick) {
     for (const SphereFigures& s : spheres) {
         if (quick && s.squared_radius > 1) break;
         const double r = std::sqrt(s.squared_radius);
+        progress.report(0.3 * (s.squared_radius - 1));
         const DensityMap map = sphere_map(r, 0.05);
         IsotropicRemeshOptions remesh;
         remesh.target_length = 0.12;
@@ -324,6 +363,7 @@ ValidatedTable maps_table(bool quick) {
                                    value("H mean", h.mean, 1 / r), value("H spread", h.deviation, {})}});
         };
         add("one ring, Voronoi", voronoi);
+        add("adaptive (the default)", adaptive_curvature(mesh));
         add("field, chosen scale", field_curvature(mesh, map));
     }
     return table;
@@ -340,10 +380,10 @@ ValidatedTable validated_table(const std::string& name, bool quick, const Progre
     const std::size_t levels = quick ? edges.size() - 1 : edges.size();
     if (name == "2") return table_2();
     if (name == "3" || name == "4") return table_3_or_4(name == "4");
-    if (name == "5" || name == "6") return table_5_or_6(name == "5", levels);
-    if (name == "patches") return patches_table(levels);
-    if (name == "irregular") return irregular_table(levels);
-    if (name == "maps") return maps_table(quick);
+    if (name == "5" || name == "6") return table_5_or_6(name == "5", levels, progress);
+    if (name == "patches") return patches_table(levels, progress);
+    if (name == "irregular") return irregular_table(levels, progress);
+    if (name == "maps") return maps_table(quick, progress);
     throw InvalidInput(fmt::format("no table {}", name));
 }
 

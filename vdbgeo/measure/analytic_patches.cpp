@@ -17,10 +17,10 @@ namespace {
 /// Candidates for the floats of a vertex.
 constexpr int candidates = 1000;
 /// How far they are from its place in the lattice, as a part of an edge: a regular lattice is to stay one.
-constexpr double reach_regular = 3e-5, reach_moved = 1e-3;
+constexpr double reach_regular = 1e-5, reach_moved = 1e-3;
 /// What one-ring curvature loses by a vertex off the surface by δ, and by one that slides along it by s out
-/// of a regular lattice, at edges e and curvatures of 1/Å: about 4 δ/e² and s/(4 e) (in 1/Å).
-constexpr double loss_off = 4, loss_along = 0.25;
+/// of a regular lattice, at edges e and curvatures of 1/Å: about 4 δ/e² and 0.6 s/e (in 1/Å).
+constexpr double loss_off = 4, loss_along = 0.6;
 
 /// The square of a profile ρ(y) that is turned around the y axis, with its derivatives by y.
 struct Profile {

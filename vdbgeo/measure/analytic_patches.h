@@ -40,7 +40,7 @@ double patch_field(PatchShape shape, const Vec3d& p);
 struct AnalyticPatchOptions {
     PatchShape shape = PatchShape::peak;
     double max_edge = 0.1;  ///< Å: the longest edge at a measured vertex
-    double radius = 0.25;   ///< Å: vertices with x² + y² ≤ radius² are measured
+    double radius = 0.2;    ///< Å: vertices with x² + y² ≤ radius² are measured
     int margin = 3;         ///< rings of vertices, at least, between these and the border
     /// 0: the image of a lattice of equilateral triangles, where each vertex has its neighbours in opposite
     /// pairs. Above: vertices are moved within the lattice by up to this part of its edges along x and y, in
@@ -59,7 +59,7 @@ struct AnalyticPatch {
 
 /// A patch of about (2.3 radius / max_edge + 2 margin)² vertices on a known surface. Points of meshes are
 /// 32-bit floats: a vertex off the surface by δ costs the one-ring formulas of the order of δ/e² at edges e,
-/// which would hide what they do at edges of 0.01 Å. So of the floats within 3e-5 of an edge (1e-3 with
+/// which would hide what they do at edges of 0.01 Å. So of the floats within 1e-5 of an edge (1e-3 with
 /// jitter) of a vertex's place those are taken that lie so near to the surface that least is lost: some 1e-11
 /// Å off. Throws InvalidInput for options that check() refuses. Cost: some 10 µs a vertex.
 AnalyticPatch analytic_patch(const AnalyticPatchOptions& options);

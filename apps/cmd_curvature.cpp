@@ -1,1 +1,230 @@
+// vdbgeo curvature: curvature at the vertices of a mesh.
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "apps/command.h"
+#include "apps/curvature_report.h"
+#include "apps/flags.h"
+#include "apps/stages.h"
+#include "converters/mesh_file.h"
+#include "vdbgeo/measure/adaptive_curvature.h"
+#include "vdbgeo/measure/curvature_tensor.h"
+#include "vdbgeo/measure/discrete_curvature.h"
+#include "vdbgeo/measure/field_curvature.h"
+#include "vdbgeo/measure/jet_curvature.h"
+#include "vdbgeo/measure/normal_voting.h"
+#include "vdbgeo/measure/shape_types.h"
+#include "vdbgeo/measure/vertex_areas.h"
+#include "vdbgeo/measure/vertex_samples.h"
+
+namespace vdbgeo::app {
+namespace {
+
+struct CurvatureOptions {
+    std::string in, out, map, method = "auto";
+    std::string table, histogram;
+    std::optional<double> radius, flatness;
+    DiscreteCurvatureOptions discrete;
+    CurvatureTensorOptions tensor;
+    JetOptions jets;
+    NormalVotingOptions voting;
+    AdaptiveCurvatureOptions adaptive;
+    FieldCurvatureOptions field;
+    std::vector<std::string> samples;
+    VertexSampleOptions sampling;
+    MapFlags map_flags;
+
+    std::string chosen() const { return method != "auto" ? method : map.empty() ? "adaptive" : "field"; }
+};
+
+/// The flags that belong to some methods only.
+const std::vector<std::pair<std::string, std::vector<std::string>>>& owners() {
+    static const std::vector<std::pair<std::string, std::vector<std::string>>> table{
+        {"--area", {"discrete"}},
+        {"--neighbourhood", {"tensor"}},
+        {"--radius", {"adaptive", "tensor", "jets", "voting"}},
+        {"--degree", {"jets"}},
+        {"--rings", {"jets"}},
+        {"--map", {"field"}},
+        {"--scale", {"field"}}};
+    return table;
+}
+
+void finish(CurvatureOptions& o, const CLI::App& flags) {
+    const std::string method = o.chosen();
+    for (const auto& [flag, methods] : owners())
+        if (std::find(methods.begin(), methods.end(), method) == methods.end())
+            refuse_flags(flags, {flag}, "belongs to --method " + fmt::format("{}", fmt::join(methods, ", ")));
+    if (method == "field" && o.map.empty()) throw UsageError("--method field needs --map");
+    if (o.samples.empty()) refuse_flags(flags, {"--sample-offset", "--sample-mean"}, "belongs to --sample");
+    o.tensor.radius = o.jets.radius = o.voting.radius = o.adaptive.radius = o.radius;
+    check_usage(o.tensor);
+    check_usage(o.jets);
+    check_usage(o.voting);
+    check_usage(o.adaptive);
+    check_usage(o.field);
+    check_usage(o.sampling);
+    for (const std::string& s : o.samples)
+        if (s.find('=') == std::string::npos || s.front() == '=' || s.back() == '=')
+            throw UsageError(fmt::format("--sample {}: expected NAME=MAP", s));
+    if (o.flatness && !(*o.flatness >= 0)) throw UsageError("--flatness: expected 0 or more, in 1/Å");
+    if (!o.table.empty() && !has_ending(o.table, ".csv"))
+        throw UsageError(fmt::format("{}: tables are CSV files: .csv", o.table));
+    if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
+        throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
+    o.map_flags.finish();
+}
+
+/// The curvature by the chosen method; what it chose goes into `j`.
+Curvatures estimate(const CurvatureOptions& o, const TriMesh& mesh, Json& j, Session& session) {
+    const std::string method = o.chosen();
+    j["method"] = method;
+    if (method == "field") {
+        const MapFile in = read_map(o.map, o.map_flags.options, session.stage("reading the map"));
+        for (const std::string& w : in.warnings) session.warn(o.map + ": " + w);
+        FieldCurvatureOptions options = o.field;
+        options.level_set = in.level_set;
+        FieldCurvature c = field_curvature(mesh, in.map, options, session.stage("curvature"));
+        j["scale_voxels"] = c.scale;
+        return c;
+    }
+    const Progress progress = session.stage("curvature");
+    if (method == "discrete") return discrete_curvature(mesh, o.discrete, progress);
+    if (method == "tensor") return tensor_curvature(mesh, o.tensor, progress);
+    if (method == "jets") return jet_curvature(mesh, o.jets, progress);
+    if (method == "voting") return voted_curvature(mesh, o.voting, progress);
+    AdaptiveCurvature c = adaptive_curvature(mesh, o.adaptive, progress);
+    j["radius_A"] = c.radius;
+    return c;
+}
+
+std::vector<MeshProperty> sampled(const CurvatureOptions& o, const TriMesh& mesh, Session& session) {
+    std::vector<MeshProperty> all;
+    for (const std::string& s : o.samples) {
+        const std::size_t equals = s.find('=');
+        const std::string name = s.substr(0, equals), file = s.substr(equals + 1);
+        const MapFile in = read_map(file, o.map_flags.options, session.stage("reading " + name));
+        for (const std::string& w : in.warnings) session.warn(file + ": " + w);
+        all.push_back(sample_at_vertices(mesh, in.map, name, o.sampling, session.stage("sampling")));
+    }
+    return all;
+}
+
+void put(TriMesh& mesh, const MeshProperty& property) {
+    for (MeshProperty& p : mesh.vertex_properties)
+        if (p.name == property.name) {
+            p = property;
+            return;
+        }
+    mesh.vertex_properties.push_back(property);
+}
+
+void run_curvature(const CurvatureOptions& o, Session& session) {
+    check_mesh_output(o.out);
+    for (const char* ending : {".obj", ".off", ".stl"})
+        if (has_ending(o.out, ending))
+            session.warn(
+                fmt::format("{}: {} files hold no curvature; .ply, .vtp and .glb do", o.out, ending));
+    Json seconds, j;
+    Clock clock;
+    TriMesh mesh = read_mesh(o.in, session.stage("reading"));
+    seconds["read"] = clock.lap();
+    const Curvatures curvature = naming(o.in, [&] { return estimate(o, mesh, j, session); });
+    seconds["compute"] = clock.lap();
+    const Array<double> areas = vertex_areas(mesh);
+    CurvatureReport report{mesh, curvature, areas, o.flatness.value_or(default_flatness(curvature, areas)),
+                           sampled(o, mesh, session)};
+    j.update(curvature_json(report));
+    seconds["report"] = clock.lap();
+    attach(mesh, curvature, report.flatness);
+    for (const MeshProperty& p : report.sampled) put(mesh, p);
+    if (!o.table.empty()) write_curvature_table(report, o.table, session.stage("table"));
+    if (!o.histogram.empty()) write_curvature_histogram(report, o.histogram);
+    write_mesh(mesh, o.out, {}, session.stage("writing"));
+    seconds["write"] = clock.lap();
+    session.end_stage();
+    j["seconds"] = seconds;
+    if (!session.json) {
+        session.say(fmt::format("method      {}{}", j["method"].get<std::string>(),
+                                j.contains("radius_A")
+                                    ? fmt::format(", neighbourhoods of {:.4g} Å", j["radius_A"].get<double>())
+                                : j.contains("scale_voxels")
+                                    ? fmt::format(", scale {:.3g} voxels", j["scale_voxels"].get<double>())
+                                    : ""));
+        for (const std::string& line : curvature_text(report)) session.say(line);
+    }
+    session.result(j);
+}
+
+void add_method_flags(CLI::App& app, CurvatureOptions& o) {
+    app.add_option("--method", o.method,
+                   "auto (field where there is a map, else adaptive), adaptive, field, jets, tensor, voting "
+                   "or discrete")
+        ->check(CLI::IsMember({"auto", "adaptive", "field", "jets", "tensor", "voting", "discrete"})
+                    .description(""))
+        ->capture_default_str();
+    app.add_option("--map", o.map, "field: the map or grid that the mesh is the surface of");
+    app.add_option("--scale", o.field.scale,
+                   "field: the density is seen through a gaussian of this standard deviation, in voxels "
+                   "[by the map]");
+    app.add_option("--radius", o.radius,
+                   "adaptive, tensor, jets, voting: size of the neighbourhood, in Å [by the mesh]");
+    app.add_option("--degree", o.jets.degree, "jets: degree of the polynomial, 2 to 4")
+        ->capture_default_str();
+    app.add_option("--rings", o.jets.rings, "jets: vertices within this many edges, without --radius")
+        ->capture_default_str();
+    app.add_option("--neighbourhood", o.tensor.neighbourhood, "tensor: ring, ball or geodesic")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, TensorNeighbourhood>{
+                                                {"ring", TensorNeighbourhood::ring},
+                                                {"ball", TensorNeighbourhood::ball},
+                                                {"geodesic", TensorNeighbourhood::geodesic}})
+                        .description(""))
+        ->default_str("ball");
+    app.add_option("--area", o.discrete.area, "discrete: area of a vertex: barycentric, voronoi or mixed")
+        ->transform(
+            CLI::CheckedTransformer(std::map<std::string, DualArea>{{"barycentric", DualArea::barycentric},
+                                                                    {"voronoi", DualArea::voronoi},
+                                                                    {"mixed", DualArea::mixed}})
+                .description(""))
+        ->default_str("mixed");
+}
+
+}  // namespace
+
+Command curvature_command() {
+    return {
+        "curvature", "Curvature, shape index and surface types at the vertices of a mesh",
+        "  vdbgeo curvature groel.ply curved.ply --map emd_1080.map\n"
+        "  vdbgeo curvature groel.ply curved.ply --table curved.csv --sample density=emd_1080.map",
+        [](CLI::App& app) {
+            auto o = std::make_shared<CurvatureOptions>();
+            app.add_option("in", o->in, "Mesh: " + mesh_endings_text())->required();
+            app.add_option("out", o->out,
+                           "The mesh with its curvature as vertex properties: " + mesh_endings_text())
+                ->required();
+            add_method_flags(app, *o);
+            app.add_option("--flatness", o->flatness,
+                           "Principal curvatures up to this, in 1/Å, count as 0 for the surface types [by "
+                           "the mesh]");
+            app.add_option("--sample", o->samples,
+                           "NAME=MAP: the map's value at each vertex, as a property and in the tables; may "
+                           "be repeated");
+            app.add_option("--sample-offset", o->sampling.offset,
+                           "Sample this far outside along the normal (negative: inside), in Å")
+                ->capture_default_str();
+            app.add_option("--sample-mean", o->sampling.mean_over,
+                           "Mean over this length along the normal, in Å; 0: one sample")
+                ->capture_default_str();
+            app.add_option("--table", o->table, "Write one line a vertex as CSV here");
+            app.add_option("--histogram", o->histogram,
+                           "Write the distributions of k1, k2 and H over the area as a PNG here");
+            o->map_flags.add_reading(app);
+            return [o, flags = &app](Session& session) {
+                finish(*o, *flags);
+                run_curvature(*o, session);
+            };
+        }};
+}
+
+}  // namespace vdbgeo::app

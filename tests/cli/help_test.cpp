@@ -7,9 +7,9 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info",    "convert",    "phantom",  "denoise",  "edges",  "transform",
-                         "flow",    "surface",    "remesh",   "simplify", "smooth", "repair",
-                         "measure", "components", "validate", "render",   "model"};
+const Words all_commands{"info",      "convert", "phantom",  "denoise", "edges",  "transform", "flow",
+                         "surface",   "remesh",  "simplify", "smooth",  "repair", "measure",   "components",
+                         "curvature", "pockets", "validate", "render",  "model"};
 
 struct Promise {
     const char* command;
@@ -36,6 +36,8 @@ const std::vector<Promise> promises{
     {"smooth", {"--method TEXT=taubin", "in Å^4"}},
     {"repair", {"--max-hole UINT=1000"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
+    {"curvature",
+     {"--method TEXT=auto", "in 1/Å", "in voxels", "in Å", "--degree INT=2", "--area", "NAME=MAP"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},

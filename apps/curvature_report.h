@@ -1,0 +1,32 @@
+// The numbers of a surface's curvature: JSON, lines to read, a table of the vertices, a picture.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/session.h"
+#include "vdbgeo/measure/curvature.h"
+
+namespace vdbgeo::app {
+
+/// Curvature of a mesh, and what else is known at its vertices.
+struct CurvatureReport {
+    const TriMesh& mesh;
+    const Curvatures& curvature;
+    const Array<double>& areas;         ///< of the vertices, Å²
+    double flatness = 0;                ///< of the surface types, 1/Å
+    std::vector<MeshProperty> sampled;  ///< values of maps at the vertices
+};
+
+/// Counts, area-weighted distributions of H, K, k1, k2, shape_index and curvedness, area by surface type,
+/// ∫K dA, ∫H² dA, and the distribution of every sampled value.
+Json curvature_json(const CurvatureReport& report);
+std::vector<std::string> curvature_text(const CurvatureReport& report);
+
+/// One line a vertex as CSV: place, area, normal curvature values, directions, type, flags, sampled values.
+void write_curvature_table(const CurvatureReport& report, const std::string& path, const Progress& progress);
+
+/// The distributions of k1, k2 and H over the area (cf. the paper's Figs 11–14) as a PNG.
+void write_curvature_histogram(const CurvatureReport& report, const std::string& path);
+
+}  // namespace vdbgeo::app

@@ -175,6 +175,10 @@ void check_curvature_input(const TriMesh& mesh, const char* stage) {
             stage, sums.largest, sums.spacing(), edge));
 }
 
+double mean_edge(const TriMesh& mesh) {
+    return mesh.empty() ? 0 : sum_edges(mesh, 1).length / (3 * static_cast<double>(mesh.triangles.size()));
+}
+
 void check_oriented(std::uint64_t misoriented, const char* stage) {
     if (misoriented > 0)
         throw InvalidInput(fmt::format(

@@ -53,5 +53,7 @@ class OneRing {
 void check_curvature_input(const TriMesh& mesh, const char* stage);
 /// Throws InvalidInput where the number of vertices with misoriented faces is not 0.
 void check_oriented(std::uint64_t misoriented, const char* stage);
+/// Over the sides of all faces, Å: inner edges count twice. 0 without faces.
+double mean_edge(const TriMesh& mesh);
 
 }  // namespace vdbgeo

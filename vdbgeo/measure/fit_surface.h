@@ -1,6 +1,8 @@
 // What fits to a surface begin with: its mesh without caps, who is joined to whom, normals, areas.
 #pragma once
 
+#include <utility>
+
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/core/vertex_neighbours.h"
 
@@ -17,7 +19,15 @@ class FitSurface {
     const Vec3f& normal(VertexId v) const { return normals_[v]; }
     /// A third of the areas of the faces around.
     float area(VertexId v) const { return areas_[v]; }
-    Vec3d point(VertexId v) const { return mesh_.points[v].cast<double>(); }
+    /// The vertex, moved by its shift where there are any.
+    Vec3d point(VertexId v) const {
+        Vec3d p = mesh_.points[v].cast<double>();
+        if (!shifts_.empty()) p += shifts_[v].cast<double>();
+        return p;
+    }
+    /// Moves each vertex for the fits; normals and areas stay. Shifts apart keep their digits, which are lost
+    /// in coordinates.
+    void set_shifts(Array<Vec3f> shifts) { shifts_ = std::move(shifts); }
 
  private:
     static TriMesh without_caps(const TriMesh& mesh);
@@ -27,6 +37,7 @@ class FitSurface {
     VertexNeighbours neighbours_;
     Array<Vec3f> normals_;
     Array<float> areas_;
+    Array<Vec3f> shifts_;  // empty for none
 };
 
 }  // namespace vdbgeo

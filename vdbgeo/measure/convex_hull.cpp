@@ -27,7 +27,7 @@ using Point = Kernel::Point_3;
 
 constexpr std::size_t few = 4000;  ///< not worth a filter
 constexpr std::size_t grain = 1 << 14;
-constexpr int squares = 64;  ///< of the look-up's cube, along a side
+constexpr std::size_t many = 100000;  ///< worth a fine one
 
 bool before(const Vec3f& a, const Vec3f& b) {
     return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
@@ -120,7 +120,7 @@ void sort_unique(Array<Vec3f>& points) {
 /// corner.
 class Inside {
  public:
-    explicit Inside(const TriMesh& body) {
+    Inside(const TriMesh& body, int squares) : squares_(squares) {
         centre_ = Vec3d::Zero();
         for (const Vec3f& p : body.points) centre_ += p.cast<double>() / double(body.points.size());
         std::vector<Vec3d> planes;  // n / d
@@ -130,7 +130,7 @@ class Inside {
                                      .cross(body.points[t[2]].cast<double>() - centre_ - a);
             if (normal.dot(a) > 0) planes.emplace_back(normal / normal.dot(a));
         }
-        constexpr std::size_t side = squares + 1;
+        const auto count = static_cast<std::size_t>(squares), side = count + 1;
         std::vector<double> corner(6 * side * side, 0);
         parallel_for(corner.size(), 64, [&](std::size_t i) {
             const int axis = static_cast<int>(i / (2 * side * side));
@@ -140,9 +140,9 @@ class Inside {
             ray[(axis + 2) % 3] = -1 + 2.0 * static_cast<double>(i / side % side) / squares;
             for (const Vec3d& plane : planes) corner[i] = std::max(corner[i], plane.dot(ray));
         });
-        steepest_.resize(6 * squares * squares);
+        steepest_.resize(6 * count * count);
         for (std::size_t i = 0; i < steepest_.size(); ++i) {
-            const std::size_t face = i / (squares * squares), y = i / squares % squares, x = i % squares;
+            const std::size_t face = i / (count * count), y = i / count % count, x = i % count;
             const double* c = corner.data() + (face * side + y) * side + x;
             steepest_[i] = std::max({c[0], c[1], c[side], c[side + 1]});
         }
@@ -155,14 +155,17 @@ class Inside {
         const double t = d.cwiseAbs().maxCoeff(&axis);
         if (!(t > 0)) return true;
         const auto square = [&](Eigen::Index a) {
-            const int at = static_cast<int>((d[a % 3] / t + 1) * (0.5 * squares));
-            return static_cast<std::size_t>(std::min(at, squares - 1));
+            const int at = static_cast<int>((d[a % 3] / t + 1) * (0.5 * squares_));
+            return static_cast<std::size_t>(std::min(at, squares_ - 1));
         };
         const auto face = static_cast<std::size_t>(2 * axis + (d[axis] > 0));
-        return t * steepest_[(face * squares + square(axis + 2)) * squares + square(axis + 1)] < margin;
+        return t * steepest_[(face * std::size_t(squares_) + square(axis + 2)) * std::size_t(squares_) +
+                             square(axis + 1)] <
+               margin;
     }
 
  private:
+    int squares_;  ///< along a side of the cube
     Vec3d centre_;
     std::vector<double> steepest_;  ///< the largest 1/t of each square
 };
@@ -172,7 +175,7 @@ Array<Vec3f> outside(const Array<Vec3f>& points, Array<Vec3f> some) {
     sort_unique(some);
     const TriMesh body = quickhull(some);
     if (body.empty()) return points;
-    const Inside inside(body);
+    const Inside inside(body, points.size() > many ? 128 : 32);
     const std::size_t blocks = (points.size() + grain - 1) / grain;
     std::vector<std::vector<Vec3f>> kept(blocks);
     parallel_blocks(points.size(), grain, [&](std::size_t begin, std::size_t end) {

@@ -19,8 +19,9 @@ namespace vdbgeo {
 namespace {
 
 constexpr std::uint32_t none = 0xFFFFFFFFu;
-/// Of the median curvedness: what protrusions are sharper than.
-constexpr double protrusion_share = 2;
+/// Of the median curvedness: what pockets and protrusions are sharper than. Chosen by looking at maps.
+constexpr double pocket_share = 0.5, protrusion_share = 2;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::uint8_t left_out = curvature_border | curvature_cap | curvature_undefined;
 
 /// Both kinds as one: patches where `value` (k2, or −k1) is under `level`.
@@ -37,7 +38,7 @@ struct Search {
     std::vector<Pocket> list;          ///< by patch
 
     void choose_bounds(Pockets& found);
-    void find_vertices();
+    void find_vertices(double k1_below);
     void find_patches(double min_persistence, double min_area);
     void sum_up(const std::vector<double>& depths);
     void find_rims();
@@ -52,20 +53,20 @@ void Search::choose_bounds(Pockets& found) {
         bend[v] = curvedness(curvature.k1[v], curvature.k2[v]);
     });
     const double median = area_histogram(bend, areas, 1).median;
-    found.threshold = pocket ? options.k2_below.value_or(-median)
+    found.threshold = pocket ? options.k2_below.value_or(-pocket_share * median)
                              : options.k1_above.value_or(protrusion_share * median);
     level = pocket ? found.threshold : -found.threshold;
+    found.k1_below = pocket ? options.k1_below.value_or(median) : infinity;
     const double sharp = std::max(std::abs(found.threshold), median);
     found.min_area = options.min_area.value_or(sharp > 0 ? 1 / (sharp * sharp) : 0);
     found.min_persistence = options.min_persistence.value_or(sharp);
     found.area_A2 = std::accumulate(areas.begin(), areas.end(), 0.0);
 }
 
-void Search::find_vertices() {
-    const double highest_k1 = options.k1_below.value_or(std::numeric_limits<double>::infinity());
+void Search::find_vertices(double k1_below) {
     for (std::size_t v = 0; v < value.size(); ++v)
         if (value[v] < level && !(curvature.flags[v] & left_out) && std::isfinite(value[v]) &&
-            curvature.k1[v] <= highest_k1)
+            curvature.k1[v] <= k1_below)
             vertices.push_back(static_cast<VertexId>(v));
 }
 
@@ -159,10 +160,11 @@ void PocketOptions::check() const {
         if (!good)
             throw InvalidInput(fmt::format("pockets: {} is {}, where {} is needed", name, value, what));
     };
-    const std::pair<const char*, std::optional<double>> bounds[] = {
-        {"the bound on k2", k2_below}, {"the bound on k1", k1_below}, {"the bound on k1", k1_above}};
+    const std::pair<const char*, std::optional<double>> bounds[] = {{"the bound on k2", k2_below},
+                                                                    {"the bound on k1", k1_above}};
     for (const auto& [name, value] : bounds)
         need(!value || std::isfinite(*value), name, value.value_or(0), "a finite number");
+    need(!k1_below || *k1_below > -infinity, "the bound on k1", k1_below.value_or(0), "a number");
     need(!min_area || (*min_area >= 0 && std::isfinite(*min_area)), "the least area", min_area.value_or(0),
          "0 or more");
     need(!min_persistence || *min_persistence >= 0, "the least persistence", min_persistence.value_or(0),
@@ -188,7 +190,7 @@ Pockets find_pockets(const TriMesh& mesh, const Curvatures& curvature, const Poc
                   {},   {},        {}};
     search.choose_bounds(found);
     progress.report(0.2);
-    search.find_vertices();
+    search.find_vertices(found.k1_below);
     search.find_patches(found.min_persistence, found.min_area);
     progress.report(0.5);
     const Progress deep = progress.part(0.5, 0.9);

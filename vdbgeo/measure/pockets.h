@@ -14,11 +14,14 @@ enum class PatchKind { pocket, protrusion };
 
 struct PocketOptions {
     PatchKind kind = PatchKind::pocket;
-    /// Pockets: k2 under this, 1/Å. None: −c, c the median curvedness of the surface by area: a pocket bends
-    /// inward more sharply than half of the surface bends at all.
+    /// Pockets: k2 under this, 1/Å. None: −c/2, c the median curvedness of the surface by area: a pocket
+    /// bends inward half as sharply as the surface bends at a typical place, or more …
     std::optional<double> k2_below;
-    std::optional<double> k1_below;  ///< pockets: and k1 not above this, 1/Å; none: no bound
-    std::optional<double> k1_above;  ///< protrusions: k1 above this, 1/Å; none: 2 c
+    /// Pockets: and k1 not above this, 1/Å (infinity: no bound). None: c: … and outward no more than is
+    /// typical, which leaves out necks and the flanks of ridges.
+    std::optional<double> k1_below;
+    /// Protrusions: k1 above this, 1/Å. None: 2 c.
+    std::optional<double> k1_above;
     /// Å²; none: 1/s², s the larger of |threshold| and c, which is a thirteenth of the area of a sphere of
     /// curvature s: smaller patches are roughness.
     std::optional<double> min_area;
@@ -59,7 +62,9 @@ struct Pocket {
 struct Pockets {
     std::vector<Pocket> list;  ///< by falling score, of equals the lower extreme_vertex first
     Array<std::uint32_t> id;   ///< of each vertex, 0: none
-    double threshold = 0;      ///< the bounds used
+    // The bounds used.
+    double threshold = 0;  ///< pockets: k2_below; protrusions: k1_above
+    double k1_below = 0;   ///< infinite for protrusions
     double min_area = 0, min_persistence = 0;
     double area_A2 = 0;  ///< of the surface, caps left out
 };

@@ -39,6 +39,7 @@ const std::vector<Promise> promises{
     {"curvature",
      {"--method TEXT=auto", "in 1/Å", "in voxels", "in Å", "--degree INT=2", "--area", "NAME=MAP"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
+    {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
 

@@ -29,11 +29,11 @@ struct NormalVotingOptions {
 ///    Σ w κ t tᵀ / Σ w, w = a third of the area of the faces at x · exp(−3 distance / g):
 ///    k1 = 3 b1 − b2, k2 = 3 b2 − b1, directions the eigenvectors.
 ///
-/// Other than PyCurv, which works at the middles of faces, this works at the vertices; distances run across
-/// faces (GeodesicDisc), not from middle to middle; normals point outward, so that k1 and k2 there are k1 and
-/// k2 here only where its surface's normals point inward, its own convention. PyCurv drops what is nearer
-/// than g to a border; here a border vertex takes the votes of its one side and is flagged. Exact on spheres
-/// of exact normals; smooth over features smaller than the radius.
+/// Other than PyCurv, which works at the middles of faces, this works at the vertices, and distances run
+/// across faces (GeodesicDisc), not from middle to middle. PyCurv wants normals that point inward: given a
+/// surface whose normals point outward, it turns every sign, and its kappa_1 is −k2 here. It can leave out
+/// what is nearer than g to a border; here a border vertex takes the votes of its one side and is flagged.
+/// Exact on a sphere if its voted normals are; what is smaller than the radius is smoothed away.
 ///
 /// Any mesh that `curvature_flags` takes; caps have no vote. Undefined too where nothing else is within g.
 /// Throws what `curvature_flags` throws, InvalidInput for a radius that is not positive, and Cancelled.

@@ -59,7 +59,7 @@ std::vector<Estimate> estimates(const ScaledFits& scaled, const std::vector<Vert
         PatchFit& patch = fits.local();
         FittedCurvature k;
         for (std::size_t i = begin; i < end; ++i)
-            if (scaled.fit(patch, vertices[i], scale, k) && k.degree == scale.degree) out[i] = {k.k1, k.k2};
+            if (scaled.fit(patch, vertices[i], scale, k)) out[i] = {k.k1, k.k2};
     });
     return out;
 }
@@ -92,9 +92,12 @@ bool ScaledFits::fit(PatchFit& patch, VertexId v, const FitScale& s, FittedCurva
 }
 
 bool ScaledFits::fit_anyhow(PatchFit& patch, VertexId v, const FitScale& s, FittedCurvature& out) const {
-    if (fit(patch, v, s, out)) return true;
-    for (const double wider : {1.4, 2.0})
-        if (s.rings == 0 && patch.ball(v, wider * radius(v, s), 2, out)) return true;
+    for (int degree = s.degree; degree >= 2; degree -= 2) {
+        for (const int more : {0, 1, 2})
+            if (s.rings > 0 && patch.rings(v, s.rings + more, degree, out)) return true;
+        for (const double wider : {1.0, 1.4, 2.0})
+            if (s.rings == 0 && patch.ball(v, wider * radius(v, s), degree, out)) return true;
+    }
     return patch.rings(v, 2, 2, out) || patch.rings(v, 3, 2, out) || patch.sphere(v, out);
 }
 

@@ -29,7 +29,7 @@ class ScaledFits {
 
     /// False where the points do not determine the jet.
     bool fit(PatchFit& patch, VertexId v, const FitScale& s, FittedCurvature& out) const;
-    /// The same, and then wider, then rings, then a sphere.
+    /// The same, and where that fails wider, then of degree 2, then over rings, then a sphere.
     bool fit_anyhow(PatchFit& patch, VertexId v, const FitScale& s, FittedCurvature& out) const;
 
     struct Choice {

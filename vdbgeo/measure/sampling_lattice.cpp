@@ -34,7 +34,7 @@ std::vector<double> some_coordinates(const TriMesh& mesh, Eigen::Index axis) {
     return x;
 }
 
-/// The values that come most often, ascending; equal ones by rounding are one.
+/// The values that come most often, most often first; equal ones by rounding are one.
 std::vector<double> heavy_values(const std::vector<double>& x, double rounding) {
     std::vector<std::pair<double, std::size_t>> runs;
     for (std::size_t i = 0, j = 0; i < x.size(); i = j) {
@@ -46,8 +46,17 @@ std::vector<double> heavy_values(const std::vector<double>& x, double rounding) 
     runs.resize(std::min(runs.size(), most_heavy));
     std::vector<double> heavy;
     for (const auto& run : runs) heavy.push_back(run.first);
-    std::sort(heavy.begin(), heavy.end());
     return heavy;
+}
+
+/// Distances between neighbours among some values, and halves of them, ascending.
+std::vector<double> distances(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    std::vector<double> out;
+    for (std::size_t i = 1; i < values.size(); ++i)
+        for (const double part : {1.0, 2.0}) out.push_back((values[i] - values[i - 1]) / part);
+    std::sort(out.begin(), out.end());
+    return out;
 }
 
 /// Fits origin and step to the values near nodes, from the first origin outwards: a step that is off by
@@ -75,17 +84,13 @@ Ticks refined(Ticks ticks, const std::vector<double>& x) {
 std::optional<Ticks> axis_ticks(const std::vector<double>& x) {
     const double rounding = 2.5e-7 * std::max(std::abs(x.front()), std::abs(x.back()));
     const std::vector<double> heavy = heavy_values(x, rounding);
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < heavy.size(); ++i)
-        for (const double part : {1.0, 2.0}) steps.push_back((heavy[i] - heavy[i - 1]) / part);
-    std::sort(steps.begin(), steps.end());
     std::optional<Ticks> best;
     double best_share = least_on_planes, last = 0;
     // Of steps that explain about as much, the widest: half a step explains what a step does.
-    for (const double step : steps) {
+    for (const double step : distances(heavy)) {
         if (step <= 1e3 * rounding || step - last <= 4 * rounding) continue;
         last = step;
-        for (const std::size_t from : {heavy.size() / 2, heavy.size() / 3, 2 * heavy.size() / 3}) {
+        for (std::size_t from = 0; from < heavy.size(); from += from < 3 ? 1 : heavy.size() / 4) {
             const Ticks ticks = refined({heavy[from], step}, x);
             const auto on =
                 std::count_if(x.begin(), x.end(), [&](double value) { return ticks.off(value) < on_node; });

@@ -123,6 +123,16 @@ void SmoothedView::move_to(const openvdb::Coord& corner) {
         if (axes_[static_cast<std::size_t>(a)].smoothed) smooth(a);
 }
 
+bool SmoothedView::has_few_values(std::size_t most) const {
+    std::vector<double> seen;
+    for (const double v : cube_) {
+        if (std::isnan(v) || std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
+        if (seen.size() == most) return false;
+        seen.push_back(v);
+    }
+    return true;
+}
+
 bool SmoothedView::holds(const Vec3d& index) const {
     for (int a = 0; a < 3; ++a)
         if (!(index[a] >= corner_[a] && index[a] < corner_[a] + edge_) || index[a] < range_.low[a] - 0.5 ||

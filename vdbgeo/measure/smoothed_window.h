@@ -37,6 +37,8 @@ class SmoothedView {
 
     /// Reads the cube at `corner` and what lies around it.
     void move_to(const openvdb::Coord& corner);
+    /// Whether what was read has at most `most` different values (NaN apart): a mask, a constant.
+    bool has_few_values(std::size_t most) const;
     /// Whether an index lies where derivatives may be asked for: in the cube.
     bool holds(const Vec3d& index) const;
 

@@ -10,7 +10,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/measure/smoothed_window.h"
+#include "vdbgeo/measure/smoothed_view.h"
 
 namespace vdbgeo {
 namespace {

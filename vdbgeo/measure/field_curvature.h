@@ -40,16 +40,19 @@ struct FieldCurvature : Curvatures {
 /// **Scale** when none is given: the smallest of 1, 1.5, 2, 2.5, 3, 4 voxels at which, at up to 2300 vertices
 /// of 96 blocks, half a voxel along the surface changes k1 and k2 by under 1.5 % of their mean square (Σ|Δk|²
 /// against Σ|k|² of both places); the one that changes least where none does. Clean maps get 1. A mask (at
-/// most three values around nine of ten blocks) gets 5. Give the scale where two meshes are to be compared:
+/// most three values around nine of ten blocks) gets 5. So it is the
+/// scale at which curvature does not depend on where exactly the vertices are; errors that are smoother than
+/// σ pass. Give the scale where two meshes are to be compared:
 /// each chooses its own. Correlation of k2 on the mesh of marching cubes, interpolated at the nearest point,
 /// with that on its remeshing / the dual surface / Delaunay; in brackets with the nearest vertex instead,
 /// which is 0.3 to 0.55 voxels away:
 ///
 /// | map | scale 1 | scale 2 | scale 2.5 | scale 4 |
 /// |---|---|---|---|---|
-/// | EMD-0093 (3.6 Å, voxel 1.34 Å) | .945 .927 .915 | .979 .972 .988 | .985 .981 .989 (.960 .939 .968) |
-/// .996 .994 .997 (.985 .972 .991) | | EMD-1155, tomogram | .926 .906 .897 | .978 .969 .976 | .986 .981 .981
-/// (.962 .942 .957) | .995 .994 .996 (.984 .976 .986) | | EMD-1080, GroEL 11.5 Å | .986 .983 .993 | .995 .992
+/// | EMD-0093, voxel 1.34 Å | .945 .927 .915 | .979 .972 .988 | .985 .981 .989 (.960 .939 .968) |
+/// .996 .994 .997 (.985 .972 .991) | | EMD-1155, a tomogram | .926 .906 .897 | .978 .969 .976 | .986 .981
+/// .981
+/// (.962 .942 .957) | .995 .994 .996 (.984 .976 .986) | | EMD-1080, GroEL | .986 .983 .993 | .995 .992
 /// .993 (.979 .965 .975) | .994 .992 .994 | .989 .984 .987 | | V-ATPase phantom, SNR 0.1, denoised | .996
 /// .991 (.986 .970) | .999 .998 | 1 .999 | 1 1 |
 ///

@@ -1,4 +1,4 @@
-#include "vdbgeo/measure/smoothed_window.h"
+#include "vdbgeo/measure/smoothed_view.h"
 
 #include <algorithm>
 #include <cmath>

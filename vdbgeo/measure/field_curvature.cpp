@@ -10,7 +10,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/measure/smoothed_window.h"
+#include "vdbgeo/measure/smoothed_view.h"
 
 namespace vdbgeo {
 namespace {
@@ -28,6 +28,10 @@ constexpr double scales[] = {1, 1.5, 2, 2.5, 3, 4};
 constexpr std::size_t tried_cubes = 96, tried_vertices = 24;
 constexpr double tried_step = 0.5;  // voxels along the surface
 constexpr double agreement = 0.985;
+
+/// A mask has so few values around a piece of its surface (outside the box counts as one), and this scale.
+constexpr std::size_t mask_values = 3;
+constexpr double mask_scale = 5;
 
 /// A gaussian of the same width along every axis, as far as the samples allow.
 struct Width {
@@ -197,7 +201,22 @@ double disagreement(const Cubes& cubes, const DensityMap& map, const Width& widt
     return sums.all > 0 ? sums.difference / sums.all : 0;
 }
 
+/// Whether nine of ten of the tried cubes are those of a mask.
+bool is_mask(const Cubes& cubes, const DensityMap& map, const Width& width) {
+    const std::size_t tried = std::min(tried_cubes, cubes.runs());
+    SmoothedView view(map, width.samples);
+    std::size_t found = 0;
+    for (std::size_t t = 0; t < tried; ++t) {
+        view.move_to(cubes.corner(t * cubes.runs() / tried));
+        found += view.has_few_values(mask_values);
+    }
+    return tried > 0 && 10 * found >= 9 * tried;
+}
+
 double choose_scale(Cubes& cubes, const DensityMap& map, bool level_set) {
+    const Width first(map.frame, scales[0]);
+    cubes.sort_by(SmoothedView::edge_for(first.samples));
+    if (is_mask(cubes, map, first)) return mask_scale;
     double best = scales[0], least = std::numeric_limits<double>::infinity();
     for (const double scale : scales) {
         const Width width(map.frame, scale);

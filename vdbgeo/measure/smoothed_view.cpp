@@ -1,4 +1,4 @@
-#include "vdbgeo/measure/smoothed_window.h"
+#include "vdbgeo/measure/smoothed_view.h"
 
 #include <algorithm>
 #include <cmath>
@@ -121,6 +121,16 @@ void SmoothedView::move_to(const openvdb::Coord& corner) {
     gather(low, size);
     for (int a = 0; a < 3; ++a)
         if (axes_[static_cast<std::size_t>(a)].smoothed) smooth(a);
+}
+
+bool SmoothedView::has_few_values(std::size_t most) const {
+    std::vector<double> seen;
+    for (const double v : cube_) {
+        if (std::isnan(v) || std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
+        if (seen.size() == most) return false;
+        seen.push_back(v);
+    }
+    return true;
 }
 
 bool SmoothedView::holds(const Vec3d& index) const {

@@ -7,9 +7,9 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info",    "convert",    "phantom", "denoise",  "edges",  "transform",
-                         "flow",    "surface",    "remesh",  "simplify", "smooth", "repair",
-                         "measure", "components", "render",  "model"};
+const Words all_commands{"info",    "convert", "phantom",    "denoise",  "edges",  "transform",
+                         "flow",    "surface", "remesh",     "simplify", "smooth", "repair",
+                         "measure", "pockets", "components", "render",   "model"};
 
 struct Promise {
     const char* command;
@@ -36,6 +36,8 @@ const std::vector<Promise> promises{
     {"smooth", {"--method TEXT=taubin", "in Å^4"}},
     {"repair", {"--max-hole UINT=1000"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
+    {"pockets",
+     {"in 1/Å", "in Å²", "in Å [", "--list UINT=20", "--protrusions", "--ambient-radius", "--picture"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
@@ -110,8 +112,11 @@ TEST_F(Help, ExamplesRun) {
             // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
             for (std::size_t i = 2; i + 1 < words.size(); ++i)
                 if (words[i] == "--size") words[i + 1] = "24";
+            if (command == "render" || command == "model" ||
+                joined(words).find("--picture") != std::string::npos)
+                for (const char* word : {"--width", "160"}) words.push_back(word);
             if (command == "render" || command == "model")
-                for (const char* word : {"--width", "160", "--occlusion", "0"}) words.push_back(word);
+                for (const char* word : {"--occlusion", "0"}) words.push_back(word);
             const Ended r = run(words, here);
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
         }
@@ -121,6 +126,7 @@ TEST_F(Help, ExamplesRun) {
           "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",   "flowed.mrc",        "smooth.vdb",
           "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
           "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
-          "round.ply",        "sound.ply",         "clean.ply",  "levels.png"})
+          "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
+          "pockets.png",      "tips.json"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

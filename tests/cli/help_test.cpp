@@ -38,6 +38,8 @@ const std::vector<Promise> promises{
     {"measure", {".ply .obj .off .stl", "PNG"}},
     {"curvature",
      {"--method TEXT=auto", "in 1/Å", "in voxels", "in Å", "--degree INT=2", "--area", "NAME=MAP"}},
+    {"pockets",
+     {"in 1/Å", "in Å²", "in Å [", "--list UINT=20", "--protrusions", "--ambient-radius", "--picture"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
@@ -113,8 +115,11 @@ TEST_F(Help, ExamplesRun) {
             // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
             for (std::size_t i = 2; i + 1 < words.size(); ++i)
                 if (words[i] == "--size") words[i + 1] = "24";
+            if (command == "render" || command == "model" ||
+                joined(words).find("--picture") != std::string::npos)
+                for (const char* word : {"--width", "160"}) words.push_back(word);
             if (command == "render" || command == "model")
-                for (const char* word : {"--width", "160", "--occlusion", "0"}) words.push_back(word);
+                for (const char* word : {"--occlusion", "0"}) words.push_back(word);
             const Ended r = run(words, here);
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
         }
@@ -124,6 +129,7 @@ TEST_F(Help, ExamplesRun) {
           "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",   "flowed.mrc",        "smooth.vdb",
           "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
           "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
-          "round.ply",        "sound.ply",         "clean.ply",  "levels.png"})
+          "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
+          "pockets.png",      "tips.json"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -403,6 +403,22 @@ TEST(Pockets, RimIsTheLineOfTheThreshold) {
     EXPECT_EQ(p.depth_A, 0);  // all in one plane
 }
 
+TEST(Pockets, PinholesAreNoMouths) {
+    // A disc of radius 6 with a hole of radius 1.2, whose area is a 25th, and one of 2, whose is a ninth.
+    for (const double hole : {1.2, 2.0}) {
+        const Shape s = sheet(
+            80,
+            [&](double x, double y) { return std::max(std::hypot(x, y) - 6, hole - std::hypot(x - 2, y)); },
+            10);
+        const Pockets found = pockets(s, below(0));
+        ASSERT_EQ(found.list.size(), 1u);
+        EXPECT_EQ(found.list[0].rims, hole < 1.5 ? 1u : 2u);
+        const double length = 2 * M_PI * (hole < 1.5 ? 6 : 6 + hole);
+        EXPECT_NEAR(found.list[0].mouth_length_A, length, 0.01 * length);
+        EXPECT_NEAR(found.list[0].mouth_area_A2, 36 * M_PI, 0.01 * 36 * M_PI);
+    }
+}
+
 TEST(Pockets, BordersAndCapsAreLeftOut) {
     Shape s;
     s.mesh = flipped(open_cylinder_mesh(10, 40, 24, 96));

@@ -7,6 +7,15 @@
 namespace vdbgeo {
 namespace {
 
+/// Of the largest loop's area: what spans less is a pinhole.
+constexpr double pinhole = 0.05;
+
+struct Loop {
+    std::uint32_t patch;
+    double length;
+    Vec3d area;
+};
+
 /// An edge that leaves a patch, as inner and outer end.
 using Cut = std::uint64_t;
 Cut cut_between(VertexId in, VertexId out) { return Cut{in} << 32 | out; }
@@ -49,11 +58,11 @@ std::vector<PatchRim> patch_rims(const TriMesh& mesh, const Array<std::uint32_t>
     const auto place = [&](Cut cut) {
         const VertexId in = inner(cut), out = outer(cut);
         const double a = excess[in], b = excess[out];
-        const double along = a <= 0 && b > 0 ? -a / (b - a) : 0.5;
+        const double along = a <= 0 && b >= 0 && a < b ? -a / (b - a) : 0.5;
         const Vec3d p = mesh.points[in].cast<double>();
         return Vec3d(p + along * (mesh.points[out].cast<double>() - p));
     };
-    std::vector<PatchRim> rims(count);
+    std::vector<Loop> loops;
     std::vector<bool> done(steps.size(), false);
     const auto follow = [&](std::size_t first) {
         const Vec3d origin = place(steps[first].from);
@@ -70,15 +79,21 @@ std::vector<PatchRim> patch_rims(const TriMesh& mesh, const Array<std::uint32_t>
                                          steps.begin());
             if (s < steps.size() && steps[s].from != cut) break;
         }
-        PatchRim& rim = rims[patch[inner(steps[first].from)] - 1];
-        ++rim.loops;
-        rim.length_A += length;
-        if (doubled.norm() > 2 * rim.mouth_A2.norm()) rim.mouth_A2 = 0.5 * doubled;
+        loops.push_back({patch[inner(steps[first].from)] - 1, length, 0.5 * doubled});
     };
     for (std::size_t s = 0; s < steps.size(); ++s)
         if (!done[s] && !std::binary_search(reached.begin(), reached.end(), steps[s].from)) follow(s);
     for (std::size_t s = 0; s < steps.size(); ++s)
         if (!done[s]) follow(s);
+    std::vector<PatchRim> rims(count);
+    for (const Loop& loop : loops)
+        if (loop.area.norm() > rims[loop.patch].mouth_A2.norm()) rims[loop.patch].mouth_A2 = loop.area;
+    for (const Loop& loop : loops) {
+        PatchRim& rim = rims[loop.patch];
+        if (loop.area.norm() < pinhole * rim.mouth_A2.norm()) continue;
+        ++rim.loops;
+        rim.length_A += loop.length;
+    }
     return rims;
 }
 

@@ -9,8 +9,10 @@
 namespace vdbgeo {
 
 struct PatchRim {
-    std::uint32_t loops = 0;  ///< closed lines around the patch: 0 for a whole closed surface, 2 for a tube
-    double length_A = 0;      ///< of all loops
+    /// Closed lines around the patch that matter: 0 for a whole closed surface, 1 for a bowl, 2 for a tube.
+    /// Those that span less than a twentieth of what the largest does are pinholes.
+    std::uint32_t loops = 0;
+    double length_A = 0;             ///< of these
     Vec3d mouth_A2 = Vec3d::Zero();  ///< area vector ½ Σ p × q of the loop that spans most
 };
 

@@ -46,8 +46,10 @@ struct Pocket {
     double extreme_k = 0;  ///< the least k2 of a pocket, the greatest k1 of a protrusion
     VertexId extreme_vertex = 0;
     double depth_A = 0, mean_depth_A = 0;  ///< of its vertices: the greatest and the mean
-    std::uint32_t rims = 0;     ///< closed lines around it: 0 the wall of a cavity, 1 a pit, 2 a channel
-    double mouth_length_A = 0;  ///< of all rims
+    /// Closed lines around it, pinholes not counted: 0 the wall of a cavity, 1 a pit, 2 a channel or a
+    /// groove.
+    std::uint32_t rims = 0;
+    double mouth_length_A = 0;  ///< of these
     double mouth_area_A2 = 0;   ///< of the rim that spans most: the length of its area vector
     /// Unit direction of that area vector: out of the mouth of a pocket, towards the tip of a protrusion.
     /// Zero where there is no rim.

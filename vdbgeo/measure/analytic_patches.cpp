@@ -299,7 +299,7 @@ DensityMap patch_map(PatchShape shape, double spacing, double radius) {
 CurvatureErrors curvature_errors(const AnalyticPatch& patch, const Curvatures& estimate) {
     CurvatureErrors e;
     for (const VertexId v : patch.measured) {
-        if (!estimate.defined(v)) {
+        if (!estimate.defined(v) || std::isnan(estimate.K[v]) || std::isnan(estimate.H[v])) {
             const double none = std::numeric_limits<double>::infinity();
             return {none, none, none, none};
         }

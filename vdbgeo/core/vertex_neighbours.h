@@ -1,4 +1,4 @@
-// Who is joined to whom, and who must stay: for smoothing.
+// Who is joined to whom, and who must stay: for smoothing, and for patches around a vertex.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,8 @@
 namespace vdbgeo {
 
 /// The neighbours of each vertex, ascending: those of v are neighbours[begin[v]] … neighbours[begin[v + 1] −
-/// 1].
+/// 1]. The sides of a face that names a vertex twice are no edges. 24 bytes a face, twice that while it is
+/// made; the same for any number of threads.
 struct VertexNeighbours {
     Array<std::uint64_t> begin;
     Array<VertexId> neighbours;

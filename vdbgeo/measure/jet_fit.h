@@ -70,8 +70,9 @@ class JetSums {
         for (int i = 0; i < unknowns; ++i) heights_[i] += m[i] * z;
     }
 
-    /// The coefficients by rows of `monomial`; false where the points do not determine them.
-    bool solve(Coefficients& c) const {
+    /// The coefficients by rows of `monomial`; false where the points do not determine them: a scaled pivot below
+    /// `smallest`.
+    bool solve(Coefficients& c, double smallest = 1e-9) const {
         std::array<std::array<double, unknowns>, unknowns> a;
         for (int n = 0; n <= Degree; ++n)
             for (int j = 0; j <= n; ++j)
@@ -79,7 +80,7 @@ class JetSums {
                     for (int i = 0; i <= m; ++i)
                         a[monomial(n, j)][monomial(m, i)] = powers_[monomial(n + m, j + i)];
         c = heights_;
-        return solve_positive<unknowns>(a, c, 1e-9);
+        return solve_positive<unknowns>(a, c, smallest);
     }
 
  private:

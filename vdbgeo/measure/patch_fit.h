@@ -14,7 +14,7 @@ struct FittedCurvature {
     double k1 = 0, k2 = 0;         ///< k1 ≥ k2
     Vec3d direction1, direction2;  ///< unit, tangent
     Vec3d normal;
-    int degree = 0;                ///< of the jet: lower than asked for where points were too few
+    int degree = 0;  ///< of the jet: lower than asked for where points were too few
 };
 
 /// Fits around vertex after vertex; one object a thread.
@@ -24,8 +24,12 @@ class PatchFit {
 
     /// To the vertices in a ball, weighted by their areas and (1 − d²/r²)²; false where nothing fits.
     bool ball(VertexId v, double radius, int degree, FittedCurvature& out);
-    /// To the vertices within k edges, with equal weights.
+    /// To the vertices within k edges, weighted by (1 − (ring/(k + 1))²)³: for even meshes whose edges are
+    /// longer one way than the other.
     bool rings(VertexId v, int k, int degree, FittedCurvature& out);
+
+    /// The sphere through two rings, whichever way they face, for pieces of a few faces: equal curvatures.
+    bool sphere(VertexId v, FittedCurvature& out);
 
  private:
     struct Point {
@@ -33,9 +37,9 @@ class PatchFit {
         double weight;
     };
 
-    void gather(VertexId v, const std::vector<VertexPatch::Member>& members, double radius, bool windowed);
+    void gather(VertexId v, const std::vector<VertexPatch::Member>& members, double radius, int rings);
     bool fit(int degree, FittedCurvature& out);
-    void find_sphere();
+    bool find_sphere();
     Vec3d flattened(const Vec3d& p) const;
     template <int Degree>
     bool fit_jet(FittedCurvature& out);

@@ -8,8 +8,8 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 // clang-format on
 
-#include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/core/face_adjacency.h"
+#include "vdbgeo/core/tri_mesh.h"
 
 namespace vdbgeo {
 
@@ -26,8 +26,10 @@ struct HalfEdgeTraits : OpenMesh::DefaultTraits {
 using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<HalfEdgeTraits>;
 
 /// The same vertices and faces, numbered alike; unused vertices stay isolated. `adjacency` is that of the
-/// mesh: nothing can be dropped, and nothing is searched for a second time. Half-edge 0 of an edge is its
-/// face's lowest.
+/// mesh: nothing can be dropped, and nothing is searched for a second time. Edges are
+/// numbered by the lowest half-edge of the faces that runs along them, which is their half-edge 0, whatever
+/// the number of threads. Cost: O(n); 78 bytes a face of a closed mesh (48 in half-edges, 12 in points, 8 in
+/// faces, 6 in edges, 4 in vertices) and 12 for a moment.
 HalfEdgeMesh to_half_edges(const TriMesh& mesh, const FaceAdjacency& adjacency);
 
 /// The vertices that faces use and the faces, in order, without what is deleted; no properties.

@@ -35,7 +35,7 @@ struct CurvatureTensorOptions {
 ///   interpolated linearly, which makes the area wrong by about (edge / (2 radius))² of itself, 3 % at the
 ///   default.
 ///
-/// Averaging makes k smaller on what bends within the radius: by (radius / 4 R)² on a sphere of radius R.
+/// Averaging makes k smaller on what bends within the radius: by (radius / 2 R)² of itself on a sphere of radius R.
 /// Faces without area have the normal of their neighbour across the longest edge. Caps are left out; at a
 /// border the neighbourhood is what is there. Any mesh that `curvature_flags` takes. Throws what that throws,
 /// InvalidInput for a radius that is not positive, and Cancelled.

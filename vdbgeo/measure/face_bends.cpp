@@ -1,6 +1,9 @@
 #include "vdbgeo/measure/face_bends.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/measure/one_ring.h"
@@ -10,23 +13,39 @@ namespace {
 
 constexpr std::size_t grain = 1 << 13;
 
-/// The faces across the sides that leave a vertex.
-void find_across(const TriMesh& mesh, const OneRing& ring, Array<std::uint32_t>& across) {
-    for (std::size_t k = 0; k < ring.size(); ++k) {
-        std::uint32_t back = FaceBends::none;
-        int others = 0;
-        for (std::size_t j = 0; j < ring.size(); ++j) {
-            if (ring.in(j) == ring.out(k)) {
-                back = ring.face(j);
-                ++others;
-            }
-            others += j != k && ring.out(j) == ring.out(k);
+/// Finds the faces across the sides that leave a vertex; one object a thread.
+class SideFinder {
+ public:
+    SideFinder(const TriMesh& mesh, Array<std::uint32_t>& across) : mesh_(mesh), across_(across) {}
+
+    void find(const OneRing& ring) {
+        outgoing_.clear();
+        incoming_.clear();
+        for (std::uint32_t k = 0; k < ring.size(); ++k) {
+            outgoing_.emplace_back(ring.out(k), k);
+            incoming_.emplace_back(ring.in(k), k);
         }
-        const std::uint32_t f = ring.face(k);
-        across[3 * std::size_t{f} + corner_of(mesh.triangles[f], ring.vertex())] =
-            others == 1 ? back : FaceBends::none;
+        std::sort(outgoing_.begin(), outgoing_.end());
+        std::sort(incoming_.begin(), incoming_.end());
+        auto in = incoming_.begin();
+        for (auto out = outgoing_.begin(); out != outgoing_.end(); ++out) {
+            while (in != incoming_.end() && in->first < out->first) ++in;
+            const bool single = (out == outgoing_.begin() || out[-1].first != out->first) &&
+                                (out + 1 == outgoing_.end() || out[1].first != out->first) &&
+                                in != incoming_.end() && in->first == out->first &&
+                                (in + 1 == incoming_.end() || in[1].first != out->first);
+            if (!single) continue;
+            const std::uint32_t f = ring.face(out->second);
+            across_[3 * std::size_t{f} + corner_of(mesh_.triangles[f], ring.vertex())] =
+                ring.face(in->second);
+        }
     }
-}
+
+ private:
+    const TriMesh& mesh_;
+    Array<std::uint32_t>& across_;
+    std::vector<std::pair<VertexId, std::uint32_t>> outgoing_, incoming_;
+};
 
 Vec3d corner(const TriMesh& mesh, std::uint32_t f, std::size_t k) {
     return mesh.points[mesh.triangles[f][k % 3]].cast<double>();
@@ -65,9 +84,10 @@ FaceBends::FaceBends(const TriMesh& mesh, const VertexFaces& faces)
     });
     parallel_blocks(mesh.points.size(), grain, [&](std::size_t begin, std::size_t end) {
         OneRing ring(mesh, faces);
+        SideFinder sides(mesh, across);
         for (std::size_t v = begin; v < end; ++v) {
             ring.fill(static_cast<VertexId>(v));
-            find_across(mesh, ring, across);
+            sides.find(ring);
         }
     });
     parallel_for(mesh.triangles.size(), grain, [&](std::size_t face) {

@@ -13,9 +13,10 @@ GeodesicDisc::GeodesicDisc(const TriMesh& mesh, const VertexFaces& faces)
 }
 
 const std::vector<GeodesicDisc::Member>& GeodesicDisc::find(VertexId v, double radius) {
-    if (++now_ == 0) {  // after 2^32 discs the old stamps would come up again
+    now_ += 2;
+    if (now_ == 0) {  // after 2^31 discs the old stamps would come up again
         std::fill(stamp_.begin(), stamp_.end(), 0);
-        now_ = 1;
+        now_ = 2;
     }
     members_.clear();
     heap_.clear();
@@ -24,11 +25,18 @@ const std::vector<GeodesicDisc::Member>& GeodesicDisc::find(VertexId v, double r
         const auto [distance, from] = heap_.front();
         std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
         heap_.pop_back();
-        if (distance > distance_[from]) continue;  // a shorter way was found since
+        if (settled(from)) continue;  // by a shorter way
         if (distance > radius) break;
+        ++stamp_[from];
         members_.push_back({from, distance});
         spread(from);
     }
+    // Over a face that is obtuse towards it the front can come to what is nearer than where it stands.
+    const auto nearer = [](const Member& a, const Member& b) {
+        return a.distance != b.distance ? a.distance < b.distance : a.vertex < b.vertex;
+    };
+    if (!std::is_sorted(members_.begin() + 1, members_.end(), nearer))
+        std::sort(members_.begin() + 1, members_.end(), nearer);
     return members_;
 }
 
@@ -42,14 +50,13 @@ void GeodesicDisc::offer(VertexId v, double distance) {
 
 void GeodesicDisc::spread(VertexId from) {
     const Vec3d here = mesh_.points[from].cast<double>();
-    const double distance = distance_[from];
     for (const std::uint32_t *f = faces_.begin(from), *last = faces_.end(from); f != last; ++f) {
         if (is_cap(*f)) continue;
         const Triangle& t = mesh_.triangles[*f];
         const std::size_t k = corner_of(t, from);
         const VertexId a = t[(k + 1) % 3], b = t[(k + 2) % 3];
-        const bool a_open = !known(a) || distance_[a] > distance;
-        const bool b_open = !known(b) || distance_[b] > distance;
+        const bool a_open = !settled(a);
+        const bool b_open = !settled(b);
         if (!a_open && !b_open) continue;
         const Vec3d to_a = mesh_.points[a].cast<double>() - here;
         const Vec3d to_b = mesh_.points[b].cast<double>() - here;

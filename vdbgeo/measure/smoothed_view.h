@@ -1,6 +1,7 @@
 // A cube of a sparse map as a dense array, smoothed where that pays.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "vdbgeo/measure/gaussian_window.h"
@@ -28,16 +29,18 @@ struct Derivatives {
 /// the rest. A view belongs to one thread; the map must not change meanwhile.
 class SmoothedView {
  public:
-    /// Widths are in samples of each axis, below SmoothedView::widest.
+    /// Widths are in samples of each axis.
     SmoothedView(const DensityMap& map, const Vec3d& sigma);
 
-    static constexpr double widest = 64;
     /// Edge of the cubes that fit the width: their places are [corner, corner + edge).
     static int edge_for(const Vec3d& sigma);
 
-    /// Reads the cube of edge() samples at `corner` and what lies around it.
+    /// Reads the cube at `corner` and what lies around it.
     void move_to(const openvdb::Coord& corner);
-    int edge() const { return edge_; }
+    /// Whether what was read has at most `most` different values (NaN apart): a mask, a constant.
+    bool has_few_values(std::size_t most) const;
+    /// Whether an index lies where derivatives may be asked for: in the cube.
+    bool holds(const Vec3d& index) const;
 
     /// At an index in the cube; false where an axis has fewer than three samples, or a sample in the window
     /// is not finite.
@@ -58,6 +61,7 @@ class SmoothedView {
     SampleRange range_;
     std::array<Axis, 3> axes_;
     int edge_;
+    openvdb::Coord corner_;
     Vec3i low_, size_;  // of what cube_ holds
     std::vector<double> cube_, other_;
     mutable std::vector<double> weights_;

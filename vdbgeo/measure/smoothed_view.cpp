@@ -1,4 +1,4 @@
-#include "vdbgeo/measure/smoothed_window.h"
+#include "vdbgeo/measure/smoothed_view.h"
 
 #include <algorithm>
 #include <cmath>
@@ -108,6 +108,7 @@ void SmoothedView::smooth(int axis) {
 }
 
 void SmoothedView::move_to(const openvdb::Coord& corner) {
+    corner_ = corner;
     Vec3i low, size;
     for (int a = 0; a < 3; ++a) {
         const Axis& axis = axes_[static_cast<std::size_t>(a)];
@@ -120,6 +121,24 @@ void SmoothedView::move_to(const openvdb::Coord& corner) {
     gather(low, size);
     for (int a = 0; a < 3; ++a)
         if (axes_[static_cast<std::size_t>(a)].smoothed) smooth(a);
+}
+
+bool SmoothedView::has_few_values(std::size_t most) const {
+    std::vector<double> seen;
+    for (const double v : cube_) {
+        if (std::isnan(v) || std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
+        if (seen.size() == most) return false;
+        seen.push_back(v);
+    }
+    return true;
+}
+
+bool SmoothedView::holds(const Vec3d& index) const {
+    for (int a = 0; a < 3; ++a)
+        if (!(index[a] >= corner_[a] && index[a] < corner_[a] + edge_) || index[a] < range_.low[a] - 0.5 ||
+            index[a] > range_.high[a] + 0.5)
+            return false;
+    return true;
 }
 
 bool SmoothedView::derivatives(const Vec3d& index, Derivatives& out) const {

@@ -205,7 +205,7 @@ CurvatureErrors errors_of(Method method, const AnalyticPatch& patch, const Analy
             return curvature_errors(patch, field_curvature(patch.mesh, map, o));
         }
         case Method::adaptive:
-            break;
+            return curvature_errors(patch, adaptive_curvature(patch.mesh));
     }
     return {};
 }

@@ -21,6 +21,8 @@ constexpr double reach_regular = 1e-5, reach_moved = 1e-3;
 /// What one-ring curvature loses by a vertex off the surface by δ, and by one that slides along it by s out
 /// of a regular lattice, at edges e and curvatures of 1/Å: about 4 δ/e² and 0.6 s/e (in 1/Å).
 constexpr double loss_off = 4, loss_along = 0.6;
+/// A loss that is small enough.
+constexpr double loss_accepted = 1e-7;
 
 /// The square of a profile ρ(y) that is turned around the y axis, with its derivatives by y.
 struct Profile {
@@ -79,7 +81,7 @@ Vec3f on_surface(const AnalyticPatchOptions& o, const Eigen::Vector2d& place, do
     const double along_weight = o.jitter > 0 ? 0 : loss_along / edge;
     Vec3f best = Vec3f::Zero();
     double least = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < candidates; ++k) {
+    for (int k = 0; k < candidates && least > loss_accepted; ++k) {
         // A sequence that fills the square evenly (the plastic number's); the first is the place itself.
         const double u = 0.7548776662466927 * k, v = 0.5698402909980532 * k;
         const Eigen::Vector2d wanted =
@@ -299,7 +301,7 @@ DensityMap patch_map(PatchShape shape, double spacing, double radius) {
 CurvatureErrors curvature_errors(const AnalyticPatch& patch, const Curvatures& estimate) {
     CurvatureErrors e;
     for (const VertexId v : patch.measured) {
-        if (!estimate.defined(v)) {
+        if (!estimate.defined(v) || std::isnan(estimate.K[v]) || std::isnan(estimate.H[v])) {
             const double none = std::numeric_limits<double>::infinity();
             return {none, none, none, none};
         }

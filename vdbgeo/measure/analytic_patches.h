@@ -61,7 +61,7 @@ struct AnalyticPatch {
 /// 32-bit floats: a vertex off the surface by δ costs the one-ring formulas of the order of δ/e² at edges e,
 /// which would hide what they do at edges of 0.01 Å. So of the floats within 1e-5 of an edge (1e-3 with
 /// jitter) of a vertex's place those are taken that lie so near to the surface that least is lost: some 1e-11
-/// Å off. Throws InvalidInput for options that check() refuses. Cost: some 10 µs a vertex.
+/// Å off. Throws InvalidInput for options that check() refuses. Cost: up to 20 µs a vertex.
 AnalyticPatch analytic_patch(const AnalyticPatchOptions& options);
 
 /// The field of a shape sampled every `spacing` Å (up to 0.1), in a box that reaches six samples beyond the

@@ -131,8 +131,8 @@ void run_validate(const ValidateOptions& o, Session& session) {
     }
     session.result({{"tables", tables}, {"worse", faults}, {"seconds", clock.seconds()}});
     if (!faults.empty())
-        throw NumericalError(fmt::format("{} of the figures are worse than asked for; the first: {}",
-                                         faults.size(), faults[0]));
+        throw NumericalError(
+            fmt::format("figures worse than asked for: {}; the first: {}", faults.size(), faults[0]));
     if (!session.json) session.say("no figure is worse than the paper's, no order below what is asked for");
 }
 

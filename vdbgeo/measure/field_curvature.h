@@ -40,12 +40,11 @@ struct FieldCurvature : Curvatures {
 /// **Scale** when none is given: the smallest of 1, 1.5, 2, 2.5, 3, 4 voxels at which, at up to 2300 vertices
 /// of 96 blocks, half a voxel along the surface changes k1 and k2 by under 1.5 % of their mean square (Σ|Δk|²
 /// against Σ|k|² of both places); the one that changes least where none does. Clean maps get 1. A mask (at
-/// most three values around nine of ten blocks) gets 5. So it is the
-/// scale at which curvature does not depend on where exactly the vertices are; errors that are smoother than
-/// σ pass. Give the scale where two meshes are to be compared:
-/// each chooses its own. Correlation of k2 on the mesh of marching cubes, interpolated at the nearest point,
-/// with that on its remeshing / the dual surface / Delaunay; in brackets with the nearest vertex instead,
-/// which is 0.3 to 0.55 voxels away:
+/// most three values around nine of ten blocks) gets 5. So it is the scale at which curvature does not depend
+/// on where exactly the vertices are; errors that are smoother than σ pass. Give the scale where two meshes
+/// are to be compared: each chooses its own. Correlation of k2 on the mesh of marching cubes, interpolated at
+/// the nearest point, with that on its remeshing / the dual surface / Delaunay; in brackets with the nearest
+/// vertex instead, which is 0.3 to 0.55 voxels away:
 ///
 /// | map | scale 1 | scale 2 | scale 2.5 | scale 4 |
 /// |---|---|---|---|---|

@@ -287,6 +287,31 @@ TEST(AdaptiveCurvature, TheNodesOfAMaskAreInsideItsBoundary) {
     EXPECT_LT(mean_error(between, adaptive_curvature(between), sphere_truth(radius), radius), 0.015);
 }
 
+TEST(AdaptiveCurvature, AnchorsStandForAFitAtEveryVertex) {
+    // A mask with waves: the radius of its choice, and every vertex fitted at that radius.
+    const auto waves = [](const Vec3d& p) {
+        const double r = p.norm(), flat = std::hypot(p[0], p[1]) / std::max(r, 1e-9);
+        return r <= 18 + 2.5 * std::sin(3 * std::atan2(p[1], p[0])) * std::pow(flat, 3) ? 1.0 : 0.0;
+    };
+    const TriMesh mesh = marching_cubes(
+        test::map_from_function(Vec3i::Constant(46), test::centred_frame(46, 1), waves), {0.5});
+    const AdaptiveCurvature chosen = adaptive_curvature(mesh);
+    AdaptiveCurvatureOptions options;
+    options.radius = chosen.radius;
+    ASSERT_GT(chosen.radius, 8);
+    const Curvatures each = adaptive_curvature(mesh, options);
+    double off = 0, size = 0, aside = 0;
+    for (std::size_t v = 0; v < each.size(); ++v) {
+        off += std::hypot(chosen.k1[v] - each.k1[v], chosen.k2[v] - each.k2[v]);
+        size += std::hypot(each.k1[v], each.k2[v]);
+        const double split = each.k1[v] - each.k2[v];
+        aside += split * (1 - std::abs(static_cast<double>(chosen.direction1[v].dot(each.direction1[v]))));
+        EXPECT_NEAR(chosen.direction1[v].dot(chosen.direction2[v]), 0, 1e-5);
+    }
+    EXPECT_LT(off, 0.03 * size);
+    EXPECT_LT(aside, 0.01 * size);
+}
+
 TEST(AdaptiveCurvature, BothSidesOfASheetKeepTheirOwnCurvature) {
     const double r = 20;
     const TriMesh sheet = cut_from_grid(48, 1, [&](const Vec3d& p) { return 1.5 - std::abs(p.norm() - r); });

@@ -12,6 +12,7 @@
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/measure/fit_scale.h"
 #include "vdbgeo/measure/grid_shifts.h"
+#include "vdbgeo/measure/wide_fits.h"
 
 namespace vdbgeo {
 namespace {
@@ -47,6 +48,22 @@ double median_radius(const ScaledFits& fits, const Array<std::uint8_t>& flags, c
     return *middle;
 }
 
+void fit_each(const ScaledFits& scaled, const FitScale& scale, Curvatures& out, const Progress& progress) {
+    tbb::enumerable_thread_specific<PatchFit> fits([&] { return PatchFit(scaled.surface()); });
+    std::atomic<std::size_t> done{0};
+    parallel_blocks(out.size(), block, [&](std::size_t begin, std::size_t end) {
+        PatchFit& patch = fits.local();
+        FittedCurvature k;
+        for (std::size_t v = begin; v < end; ++v)
+            if (out.defined(v) && scaled.fit_anyhow(patch, static_cast<VertexId>(v), scale, k))
+                out.set_from_principal(v, k.k1, k.k2, k.direction1, k.direction2);
+            else
+                out.set_undefined(v);
+        const std::size_t count = done += end - begin;
+        progress.report(static_cast<double>(count) / static_cast<double>(out.size()));
+    });
+}
+
 }  // namespace
 
 void AdaptiveCurvatureOptions::check() const {
@@ -80,19 +97,10 @@ AdaptiveCurvature adaptive_curvature(const TriMesh& mesh, const AdaptiveCurvatur
     out.radius = median_radius(scaled, out.flags, scale);
     progress.report(0.4);
 
-    tbb::enumerable_thread_specific<PatchFit> fits([&] { return PatchFit(surface); });
-    std::atomic<std::size_t> done{0};
-    parallel_blocks(out.size(), block, [&](std::size_t begin, std::size_t end) {
-        PatchFit& patch = fits.local();
-        FittedCurvature k;
-        for (std::size_t v = begin; v < end; ++v)
-            if (out.defined(v) && scaled.fit_anyhow(patch, static_cast<VertexId>(v), scale, k))
-                out.set_from_principal(v, k.k1, k.k2, k.direction1, k.direction2);
-            else
-                out.set_undefined(v);
-        const std::size_t count = done += end - begin;
-        progress.report(0.4 + 0.6 * static_cast<double>(count) / static_cast<double>(out.size()));
-    });
+    if (is_wide(scale))
+        fit_by_anchors(scaled, scale, out, progress.part(0.4, 1));
+    else
+        fit_each(scaled, scale, out, progress.part(0.4, 1));
     progress.report(1);
     return out;
 }

@@ -30,7 +30,7 @@ struct Estimate {
 /// be longer one way than the other; nothing below 2.4 spacings has points enough in all directions.
 const std::vector<std::vector<FitScale>>& ladders() {
     static const std::vector<std::vector<FitScale>> all = {
-        {{2, 0, 2.4}, {2, 0, 3.4}, {2, 0, 4.8}, {2, 0, 6.8}, {2, 0, 9.6}, {2, 0, 13.6}, {2, 0, 24}},
+        {{2, 0, 2.4}, {2, 0, 3.4}, {2, 0, 4.8}, {2, 0, 6.8}, {2, 0, 9.6}, {2, 0, 13.6}, {2, 0, 19}, {2, 0, 27}},
         {{4, 2, 2}, {4, 3, 3}, {4, 4, 4}},
         {{4, 0, 3.4}, {4, 0, 4.8}, {4, 0, 6.8}, {4, 0, 9.6}, {4, 0, 13.6}}};
     return all;

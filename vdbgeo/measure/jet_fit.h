@@ -70,8 +70,8 @@ class JetSums {
         for (int i = 0; i < unknowns; ++i) heights_[i] += m[i] * z;
     }
 
-    /// The coefficients by rows of `monomial`; false where the points do not determine them: a scaled pivot below
-    /// `smallest`.
+    /// The coefficients by rows of `monomial`; false where the points do not determine them: a scaled pivot
+    /// below `smallest`.
     bool solve(Coefficients& c, double smallest = 1e-9) const {
         std::array<std::array<double, unknowns>, unknowns> a;
         for (int n = 0; n <= Degree; ++n)

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "apps/command.h"
 #include "apps/curvature_report.h"
@@ -51,6 +52,21 @@ const std::vector<std::pair<std::string, std::vector<std::string>>>& owners() {
     return table;
 }
 
+/// NAME=MAP with a name that tables and mesh files can hold, and that curvature does not take.
+void check_sample(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+        throw UsageError(fmt::format("--sample {}: expected NAME=MAP", text));
+    const std::string name = text.substr(0, equals);
+    const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
+    if (!std::all_of(name.begin(), name.end(), plain))
+        throw UsageError(fmt::format("--sample {}: a name has letters, digits and _", text));
+    static const char* const taken[] = {"K",    "H",           "k1",         "k2",
+                                        "type", "shape_index", "curvedness", "curvature_flags"};
+    if (std::find(std::begin(taken), std::end(taken), name) != std::end(taken))
+        throw UsageError(fmt::format("--sample {}: {} is the curvature's own", text, name));
+}
+
 void finish(CurvatureOptions& o, const CLI::App& flags) {
     const std::string method = o.chosen();
     for (const auto& [flag, methods] : owners())
@@ -65,9 +81,7 @@ void finish(CurvatureOptions& o, const CLI::App& flags) {
     check_usage(o.adaptive);
     check_usage(o.field);
     check_usage(o.sampling);
-    for (const std::string& s : o.samples)
-        if (s.find('=') == std::string::npos || s.front() == '=' || s.back() == '=')
-            throw UsageError(fmt::format("--sample {}: expected NAME=MAP", s));
+    for (const std::string& s : o.samples) check_sample(s);
     if (o.flatness && !(*o.flatness >= 0)) throw UsageError("--flatness: expected 0 or more, in 1/Å");
     if (!o.table.empty() && !has_ending(o.table, ".csv"))
         throw UsageError(fmt::format("{}: tables are CSV files: .csv", o.table));

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "apps/command.h"
 #include "apps/flags.h"
@@ -12,6 +13,7 @@
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/measure/adaptive_curvature.h"
 #include "vdbgeo/measure/pockets.h"
+#include "vdbgeo/measure/vertex_areas.h"
 #include "vdbgeo/view/png.h"
 #include "vdbgeo/view/render.h"
 
@@ -68,20 +70,41 @@ Json pocket_json(const Pocket& p, const char* kind) {
     return row;
 }
 
-std::string csv(const Pockets& found, const char* kind) {
-    std::string text = "id,kind";
-    for (const Column& c : columns)
-        if (&c != columns) text += fmt::format(",{}", c.name);
-    for (const Pocket& p : found.list) {
-        text += fmt::format("\n{},{}", p.id, kind);
-        for (const Column& c : columns)
-            if (&c != columns) text += "," + c.value(p).dump();
+/// null where there is no number.
+Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+/// One row a patch; beside the columns above the mean over the patch of every other value that the mesh has
+/// at its vertices, as mean_NAME.
+Json rows_of(const Pockets& found, const TriMesh& mesh, const char* kind) {
+    static const std::set<std::string> known{
+        "K", "H", "k1", "k2", "shape_index", "curvedness", "type", "curvature_flags", "pocket", "protrusion"};
+    Json rows = Json::array();
+    for (const Pocket& p : found.list) rows.push_back(pocket_json(p, kind));
+    if (rows.empty()) return rows;
+    const Array<double> areas = vertex_areas(mesh);
+    for (const MeshProperty& p : mesh.vertex_properties) {
+        if (p.components != 1 || known.count(p.name)) continue;
+        const std::vector<double> means = means_over(found, p.values, areas);
+        for (std::size_t i = 0; i < means.size(); ++i) rows[i]["mean_" + p.name] = finite_json(means[i]);
+    }
+    return rows;
+}
+
+/// The rows under their names; a value that is none is an empty field.
+std::string csv(const Json& rows, const char* kind) {
+    const Json names = rows.empty() ? pocket_json({}, kind) : rows[0];
+    std::string text;
+    for (const auto& [name, value] : names.items()) text += (text.empty() ? "" : ",") + name;
+    for (const Json& row : rows) {
+        std::string line;
+        for (const auto& [name, value] : row.items())
+            line += (line.empty() ? "" : ",") + (value.is_string() ? value.get<std::string>()
+                                                 : value.is_null() ? ""
+                                                                   : value.dump());
+        text += "\n" + line;
     }
     return text + "\n";
 }
-
-/// null where there is no bound.
-Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json bounds_json(const PocketsCommandOptions& o, const Pockets& found) {
     Json j{{"kind", o.kind()}, {"threshold_per_A", found.threshold}};
@@ -174,8 +197,7 @@ void run_pockets(const PocketsCommandOptions& o, Session& session) {
     Image image;
     if (!o.picture.empty())
         image = naming(o.in, [&] { return picture(o, mesh, found, session.stage("rendering")); });
-    Json rows = Json::array();
-    for (const Pocket& p : found.list) rows.push_back(pocket_json(p, o.kind()));
+    Json rows = rows_of(found, mesh, o.kind());
     Json j{{"file", o.in}, {"curvature", own ? "of the file" : "computed"}};
     j.update(bounds_json(o, found));
     Json all = j;
@@ -190,7 +212,7 @@ void run_pockets(const PocketsCommandOptions& o, Session& session) {
         write_mesh(marked, o.mesh, {}, session.stage("writing"));
     }
     if (!o.picture.empty()) write_png(image, o.picture);
-    write_file(o.out, has_ending(o.out, ".json") ? json_text(all, 1) + "\n" : csv(found, o.kind()));
+    write_file(o.out, has_ending(o.out, ".json") ? json_text(all, 1) + "\n" : csv(rows, o.kind()));
     seconds["write"] = clock.lap();
     session.end_stage();
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(std::min(o.list, rows.size())), rows.end());

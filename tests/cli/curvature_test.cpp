@@ -118,6 +118,8 @@ TEST_F(Curvature, RefusesWhatMakesNoSense) {
     fails({"--method", "field"}, 2, "--method field", "--map");
     fails({"--radius", "-1"}, 2, "");
     fails({"--sample", "density"}, 2, "--sample density", "NAME=MAP");
+    fails({"--sample", "a b=" + map_}, 2, "--sample a b=", "letters");
+    fails({"--sample", "k1=" + map_}, 2, "--sample k1=", "own");
     fails({"--sample-offset", "1"}, 2, "--sample-offset", "--sample");
     fails({"--map", at("none.mrc")}, 4, at("none.mrc"));
     fails({"--table", at("t.txt")}, 2, at("t.txt"), ".csv");

@@ -214,3 +214,18 @@ TEST_F(PocketsCommand, RefusesWhatMakesNoSense) {
     expect_error(vdbgeo({"pockets", at("none.ply"), at("a.csv")}), 4, at("none.ply"));
     EXPECT_EQ(listing(), (std::set<std::string>{"a.ply"}));
 }
+
+TEST_F(PocketsCommand, MeansOfOtherValuesOfTheVertices) {
+    TriMesh m = vdbgeo::read_mesh(mesh("plain.ply"));
+    MeshProperty x{"x_position", 1, {}};
+    for (const Vec3f& p : m.points) x.values.push_back(p.x());
+    m.vertex_properties.push_back(x);
+    vdbgeo::write_mesh(m, folder_ / "sampled.ply");
+    const Json j = json(with_ball({"pockets", at("sampled.ply"), at("s.csv")}));
+    ASSERT_EQ(j["listed"].size(), 2u);
+    for (const Json& row : j["listed"])
+        EXPECT_NEAR(row["mean_x_position"].get<double>(), row["centroid_x_A"].get<double>(), 1e-4);
+    const auto rows = table(bytes("s.csv"));
+    ASSERT_EQ(rows.size(), 3u);
+    EXPECT_EQ(rows[0].back(), "mean_x_position");
+}

@@ -41,19 +41,8 @@ struct FieldCurvature : Curvatures {
 /// of 96 blocks, half a voxel along the surface changes k1 and k2 by under 1.5 % of their mean square (Σ|Δk|²
 /// against Σ|k|² of both places); the one that changes least where none does. Clean maps get 1. A mask (at
 /// most three values around nine of ten blocks) gets 5. So it is the scale at which curvature does not depend
-/// on where exactly the vertices are; errors that are smoother than σ pass. Give the scale where two meshes
-/// are to be compared: each chooses its own. Correlation of k2 on the mesh of marching cubes, interpolated at
-/// the nearest point, with that on its remeshing / the dual surface / Delaunay; in brackets with the nearest
-/// vertex instead, which is 0.3 to 0.55 voxels away:
-///
-/// | map | scale 1 | scale 2 | scale 2.5 | scale 4 |
-/// |---|---|---|---|---|
-/// | EMD-0093, voxel 1.34 Å | .945 .927 .915 | .979 .972 .988 | .985 .981 .989 (.960 .939 .968) |
-/// .996 .994 .997 (.985 .972 .991) | | EMD-1155, a tomogram | .926 .906 .897 | .978 .969 .976 | .986 .981
-/// .981
-/// (.962 .942 .957) | .995 .994 .996 (.984 .976 .986) | | EMD-1080, GroEL | .986 .983 .993 | .995 .992
-/// .993 (.979 .965 .975) | .994 .992 .994 | .989 .984 .987 | | V-ATPase phantom, SNR 0.1, denoised | .996
-/// .991 (.986 .970) | .999 .998 | 1 .999 | 1 1 |
+/// on where exactly the vertices are; errors that are smoother than σ pass. Each mesh chooses its own: give
+/// the scale where two meshes are to be compared. What it gives on real maps is in docs/accuracy.md.
 ///
 /// Masks: median and 95 % error of k1 of a ball of ones among zeros, of 10 voxels' radius 6.9 and 17 % at
 /// scale 2, 1.4 and 3.8 % at 4, 1.5 and 4.0 % at 5, 2.6 and 5.3 % at 6; of 30 voxels' 16 and 54 %, 2.1 and

@@ -212,4 +212,20 @@ Pockets find_pockets(const TriMesh& mesh, const Curvatures& curvature, const Poc
     return found;
 }
 
+std::vector<double> means_over(const Pockets& pockets, const std::vector<float>& values,
+                               const Array<double>& areas) {
+    if (values.size() != pockets.id.size() || areas.size() != pockets.id.size())
+        throw InvalidInput(fmt::format("pockets: {} values and {} areas for {} vertices", values.size(),
+                                       areas.size(), pockets.id.size()));
+    std::vector<double> sum(pockets.list.size(), 0.0), weight(pockets.list.size(), 0.0);
+    for (std::size_t v = 0; v < values.size(); ++v) {
+        if (pockets.id[v] == 0 || !std::isfinite(values[v])) continue;
+        sum[pockets.id[v] - 1] += values[v] * areas[v];
+        weight[pockets.id[v] - 1] += areas[v];
+    }
+    for (std::size_t p = 0; p < sum.size(); ++p)
+        sum[p] = weight[p] > 0 ? sum[p] / weight[p] : std::numeric_limits<double>::quiet_NaN();
+    return sum;
+}
+
 }  // namespace vdbgeo

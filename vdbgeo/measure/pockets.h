@@ -88,4 +88,10 @@ struct Pockets {
 Pockets find_pockets(const TriMesh& mesh, const Curvatures& curvature, const PocketOptions& options = {},
                      const Progress& progress = {});
 
+/// The mean of a value of the vertices (local resolution, say) over each patch, weighted by `areas`
+/// (vertex_areas); what is not finite is left out, NaN where nothing is left. In the order of the list.
+/// Throws InvalidInput where the sizes differ. Cost: O(n).
+std::vector<double> means_over(const Pockets& pockets, const std::vector<float>& values,
+                               const Array<double>& areas);
+
 }  // namespace vdbgeo

@@ -207,10 +207,9 @@ TEST(AdaptiveCurvature, NoiseWidensTheNeighbourhood) {
     double before = 0;
     for (const double noise : {0.0, 0.003, 0.03}) {
         std::mt19937 random(3);
-        std::normal_distribution<double> jump(0, noise);
+        std::normal_distribution<double> jump;
         TriMesh mesh = icosphere(4, 1);
-        if (noise > 0)
-            for (Vec3f& p : mesh.points) p *= static_cast<float>(1 + jump(random));
+        for (Vec3f& p : mesh.points) p *= static_cast<float>(1 + noise * jump(random));
         const AdaptiveCurvature c = adaptive_curvature(mesh);
         EXPECT_GT(c.radius, before);
         before = c.radius;

@@ -16,6 +16,8 @@
 #include "tests/support/meshes.h"
 #include "tests/support/small_meshes.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/measure/fit_surface.h"
+#include "vdbgeo/measure/grid_shifts.h"
 #include "vdbgeo/measure/sampling_lattice.h"
 #include "vdbgeo/remesh/orient.h"
 #include "vdbgeo/surface/marching_cubes.h"
@@ -207,10 +209,9 @@ TEST(AdaptiveCurvature, NoiseWidensTheNeighbourhood) {
     double before = 0;
     for (const double noise : {0.0, 0.003, 0.03}) {
         std::mt19937 random(3);
-        std::normal_distribution<double> jump(0, noise);
+        std::normal_distribution<double> jump;
         TriMesh mesh = icosphere(4, 1);
-        if (noise > 0)
-            for (Vec3f& p : mesh.points) p *= static_cast<float>(1 + jump(random));
+        for (Vec3f& p : mesh.points) p *= static_cast<float>(1 + noise * jump(random));
         const AdaptiveCurvature c = adaptive_curvature(mesh);
         EXPECT_GT(c.radius, before);
         before = c.radius;
@@ -395,6 +396,27 @@ TEST(AdaptiveCurvature, SameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(0, std::memcmp(one.k1.data(), two.k1.data(), one.size() * sizeof(double)));
     EXPECT_EQ(0, std::memcmp(one.K.data(), two.K.data(), one.size() * sizeof(double)));
     EXPECT_EQ(0, std::memcmp(one.direction2.data(), two.direction2.data(), one.size() * sizeof(Vec3f)));
+}
+
+TEST(GridShifts, TakeVerticesToTheSurface) {
+    const Vec3d centre(0.3, -0.2, 0.1);
+    const auto distance = [&](const Vec3d& p) { return (p - centre).norm() - 20; };
+    // A distance, and a density as steep as ν = −½ a step makes it.
+    for (const bool steep : {false, true}) {
+        const TriMesh mesh = cut_from_grid(
+            46, 1, [&](const Vec3d& p) { return steep ? std::exp(-0.5 * distance(p)) - 1 : -distance(p); });
+        const auto lattice = find_sampling_lattice(mesh);
+        ASSERT_TRUE(lattice);
+        const FitSurface surface(mesh);
+        const Array<Vec3f> shifts = interpolation_shifts(surface, *lattice);
+        double before = 0, after = 0;
+        for (std::size_t v = 0; v < shifts.size(); ++v) {
+            const Vec3d p = mesh.points[v].cast<double>();
+            before += std::pow(distance(p), 2);
+            after += std::pow(distance(p + shifts[v].cast<double>()), 2);
+        }
+        EXPECT_LT(std::sqrt(after / before), steep ? 0.1 : 0.03);
+    }
 }
 
 TEST(SamplingLattice, IsFoundWhereMarchingCubesLeftIt) {

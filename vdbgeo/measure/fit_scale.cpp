@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::size_t grain = 1 << 12;
 constexpr std::size_t most_samples = 512;
-constexpr double share = 0.95;  // quantile of the changes that is compared: the worst places count
-constexpr double hopeless = 2;  // times the best of the degree so far: nothing wider is tried
-constexpr double favour = 0.1;  // power of the width by which wider neighbourhoods win a tie
+constexpr double share = 0.95;    // quantile of the changes that is compared: the worst places count
+constexpr double hopeless = 1.5;  // times the best of the degree so far: nothing wider is tried
+constexpr double favour = 0.1;    // power of the width by which wider neighbourhoods win a tie
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
@@ -30,7 +30,14 @@ struct Estimate {
 /// be longer one way than the other; nothing below 2.4 spacings has points enough in all directions.
 const std::vector<std::vector<FitScale>>& ladders() {
     static const std::vector<std::vector<FitScale>> all = {
-        {{2, 0, 2.4}, {2, 0, 3.4}, {2, 0, 4.8}, {2, 0, 6.8}, {2, 0, 9.6}, {2, 0, 13.6}, {2, 0, 19}, {2, 0, 27}},
+        {{2, 0, 2.4},
+         {2, 0, 3.4},
+         {2, 0, 4.8},
+         {2, 0, 6.8},
+         {2, 0, 9.6},
+         {2, 0, 13.6},
+         {2, 0, 19},
+         {2, 0, 27}},
         {{4, 2, 2}, {4, 3, 3}, {4, 4, 4}},
         {{4, 0, 3.4}, {4, 0, 4.8}, {4, 0, 6.8}, {4, 0, 9.6}, {4, 0, 13.6}}};
     return all;

@@ -24,7 +24,7 @@ class ScaledFits {
         : surface_(surface), spacing_(std::move(spacing)) {}
 
     const FitSurface& surface() const { return surface_; }
-    /// The ball's radius, or the largest distance within the rings that hold a third of its area.
+    /// The ball's radius; for k rings k spacings.
     double radius(VertexId v, const FitScale& s) const { return s.radius(static_cast<double>(spacing_[v])); }
 
     /// False where the points do not determine the jet.

@@ -90,8 +90,9 @@ void finish(CurvatureOptions& o, const CLI::App& flags) {
     o.map_flags.finish();
 }
 
-/// The curvature by the chosen method; what it chose goes into `j`.
-Curvatures estimate(const CurvatureOptions& o, const TriMesh& mesh, Json& j, Session& session) {
+/// The curvature by the chosen method, and the vertices' areas; what it chose goes into `j`.
+Curvatures estimate(const CurvatureOptions& o, const TriMesh& mesh, Array<double>& areas, Json& j,
+                    Session& session) {
     const std::string method = o.chosen();
     j["method"] = method;
     if (method == "field") {
@@ -104,7 +105,11 @@ Curvatures estimate(const CurvatureOptions& o, const TriMesh& mesh, Json& j, Ses
         return c;
     }
     const Progress progress = session.stage("curvature");
-    if (method == "discrete") return discrete_curvature(mesh, o.discrete, progress);
+    if (method == "discrete") {
+        DiscreteCurvature c = discrete_curvature(mesh, o.discrete, progress);
+        areas = std::move(c.dual_area);
+        return c;
+    }
     if (method == "tensor") return tensor_curvature(mesh, o.tensor, progress);
     if (method == "jets") return jet_curvature(mesh, o.jets, progress);
     if (method == "voting") return voted_curvature(mesh, o.voting, progress);
@@ -144,9 +149,10 @@ void run_curvature(const CurvatureOptions& o, Session& session) {
     Clock clock;
     TriMesh mesh = read_mesh(o.in, session.stage("reading"));
     seconds["read"] = clock.lap();
-    const Curvatures curvature = naming(o.in, [&] { return estimate(o, mesh, j, session); });
+    Array<double> areas;
+    const Curvatures curvature = naming(o.in, [&] { return estimate(o, mesh, areas, j, session); });
+    if (areas.empty()) areas = vertex_areas(mesh);
     seconds["compute"] = clock.lap();
-    const Array<double> areas = vertex_areas(mesh);
     CurvatureReport report{mesh, curvature, areas, o.flatness.value_or(default_flatness(curvature, areas)),
                            sampled(o, mesh, session)};
     j.update(curvature_json(report));

@@ -54,6 +54,13 @@ std::vector<double> area_in_bins(const Array<double>& values, const Array<double
     return area;
 }
 
+/// The areas as weights.
+Array<double> weights_of(const CurvatureReport& r) {
+    Array<double> weights = r.areas;
+    for (double& w : weights) w = std::isfinite(w) ? std::max(w, 0.0) : 0;
+    return weights;
+}
+
 /// Σ value · area over the vertices that have a value.
 template <class Value>
 double integral(const CurvatureReport& r, const Value& value) {
@@ -72,6 +79,7 @@ std::string distribution_text(const char* name, const AreaHistogram& h, const ch
 
 Json curvature_json(const CurvatureReport& r) {
     const Curvatures& c = r.curvature;
+    const Array<double> weights = weights_of(r);
     Json j{{"vertices", c.size()},
            {"faces", r.mesh.triangles.size()},
            {"undefined", with_flag(c, curvature_undefined)},
@@ -81,13 +89,13 @@ Json curvature_json(const CurvatureReport& r) {
            {"integral_K", integral(r, [&](std::size_t v) { return c.K[v]; })},
            {"integral_H2", integral(r, [&](std::size_t v) { return c.H[v] * c.H[v]; })},
            {"flatness_per_A", r.flatness}};
-    j["H_per_A"] = distribution_json(area_histogram(c.H, r.areas, bins));
-    j["K_per_A2"] = distribution_json(area_histogram(c.K, r.areas, bins));
-    j["k1_per_A"] = distribution_json(area_histogram(c.k1, r.areas, bins));
-    j["k2_per_A"] = distribution_json(area_histogram(c.k2, r.areas, bins));
-    j["shape_index"] = distribution_json(area_histogram(at_vertices(c, shape_index), r.areas, bins));
-    j["curvedness_per_A"] = distribution_json(area_histogram(at_vertices(c, curvedness), r.areas, bins));
-    const auto by_type = area_by_type(c, r.areas, r.flatness);
+    j["H_per_A"] = distribution_json(area_histogram(c.H, weights, bins));
+    j["K_per_A2"] = distribution_json(area_histogram(c.K, weights, bins));
+    j["k1_per_A"] = distribution_json(area_histogram(c.k1, weights, bins));
+    j["k2_per_A"] = distribution_json(area_histogram(c.k2, weights, bins));
+    j["shape_index"] = distribution_json(area_histogram(at_vertices(c, shape_index), weights, bins));
+    j["curvedness_per_A"] = distribution_json(area_histogram(at_vertices(c, curvedness), weights, bins));
+    const auto by_type = area_by_type(c, weights, r.flatness);
     Json types = Json::object();
     for (std::size_t t = 0; t < surface_type_count; ++t) {
         std::string name = name_of(static_cast<SurfaceType>(t));
@@ -97,27 +105,28 @@ Json curvature_json(const CurvatureReport& r) {
     j["area_by_type_A2"] = types;
     Json sampled = Json::object();
     for (const MeshProperty& p : r.sampled)
-        sampled[p.name] = distribution_json(area_histogram(as_doubles(p.values), r.areas, bins));
+        sampled[p.name] = distribution_json(area_histogram(as_doubles(p.values), weights, bins));
     if (!sampled.empty()) j["sampled"] = sampled;
     return j;
 }
 
 std::vector<std::string> curvature_text(const CurvatureReport& r) {
     const Curvatures& c = r.curvature;
+    const Array<double> weights = weights_of(r);
     std::vector<std::string> lines{
         fmt::format("vertices    {}, {} at borders, {} on caps, {} without a value", c.size(),
                     with_flag(c, curvature_border), with_flag(c, curvature_cap),
                     with_flag(c, curvature_undefined)),
-        distribution_text("H", area_histogram(c.H, r.areas, bins), "1/Å"),
-        distribution_text("K", area_histogram(c.K, r.areas, bins), "1/Å²"),
-        distribution_text("k1", area_histogram(c.k1, r.areas, bins), "1/Å"),
-        distribution_text("k2", area_histogram(c.k2, r.areas, bins), "1/Å"),
-        distribution_text("curvedness", area_histogram(at_vertices(c, curvedness), r.areas, bins), "1/Å"),
-        distribution_text("shape index", area_histogram(at_vertices(c, shape_index), r.areas, bins), "")};
+        distribution_text("H", area_histogram(c.H, weights, bins), "1/Å"),
+        distribution_text("K", area_histogram(c.K, weights, bins), "1/Å²"),
+        distribution_text("k1", area_histogram(c.k1, weights, bins), "1/Å"),
+        distribution_text("k2", area_histogram(c.k2, weights, bins), "1/Å"),
+        distribution_text("curvedness", area_histogram(at_vertices(c, curvedness), weights, bins), "1/Å"),
+        distribution_text("shape index", area_histogram(at_vertices(c, shape_index), weights, bins), "")};
     for (const MeshProperty& p : r.sampled)
         lines.push_back(
-            distribution_text(p.name.c_str(), area_histogram(as_doubles(p.values), r.areas, bins), ""));
-    const auto by_type = area_by_type(c, r.areas, r.flatness);
+            distribution_text(p.name.c_str(), area_histogram(as_doubles(p.values), weights, bins), ""));
+    const auto by_type = area_by_type(c, weights, r.flatness);
     double all = 0;
     for (const double a : by_type) all += a;
     std::string types;
@@ -178,10 +187,11 @@ void write_curvature_histogram(const CurvatureReport& r, const std::string& path
     options.x_label = "curvature (1/Å)";
     options.y_label = "share of the area, % a bin";
     const Curvatures& c = r.curvature;
+    const Array<double> weights = weights_of(r);
     // One axis for the three: from the least to the greatest of what 98 % of the area has.
     double low = 0, high = 0;
     for (const Array<double>* values : {&c.k1, &c.k2}) {
-        const AreaHistogram h = area_histogram(*values, r.areas, bins);
+        const AreaHistogram h = area_histogram(*values, weights, bins);
         low = std::min(low, h.low);
         high = std::max(high, h.high);
     }
@@ -190,7 +200,7 @@ void write_curvature_histogram(const CurvatureReport& r, const std::string& path
     std::vector<Curve> curves;
     const std::pair<const char*, const Array<double>*> shown[] = {{"k1", &c.k1}, {"k2", &c.k2}, {"H", &c.H}};
     for (const auto& [name, values] : shown) {
-        const std::vector<double> area = area_in_bins(*values, r.areas, low, high);
+        const std::vector<double> area = area_in_bins(*values, weights, low, high);
         double all = 0;
         for (const double a : area) all += a;
         Curve curve{name, {}, {}, colours.category(static_cast<std::int64_t>(curves.size()))};

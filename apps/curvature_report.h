@@ -13,13 +13,16 @@ namespace vdbgeo::app {
 struct CurvatureReport {
     const TriMesh& mesh;
     const Curvatures& curvature;
-    const Array<double>& areas;         ///< of the vertices, Å²
+    /// Of the vertices, Å²: of the method's own dual cells where it has some, so that ∫K dA = Σ K A is exact.
+    /// Cells of no or negative area (Eq 14 knows such) count in integrals only.
+    const Array<double>& areas;
     double flatness = 0;                ///< of the surface types, 1/Å
     std::vector<MeshProperty> sampled;  ///< values of maps at the vertices
 };
 
 /// Counts, area-weighted distributions of H, K, k1, k2, shape_index and curvedness, area by surface type,
 /// ∫K dA, ∫H² dA, and the distribution of every sampled value.
+/// Distributions leave out what has no area.
 Json curvature_json(const CurvatureReport& report);
 std::vector<std::string> curvature_text(const CurvatureReport& report);
 

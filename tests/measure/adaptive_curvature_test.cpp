@@ -19,6 +19,7 @@
 #include "vdbgeo/measure/fit_surface.h"
 #include "vdbgeo/measure/grid_shifts.h"
 #include "vdbgeo/measure/sampling_lattice.h"
+#include "vdbgeo/measure/wide_fits.h"
 #include "vdbgeo/remesh/orient.h"
 #include "vdbgeo/surface/marching_cubes.h"
 
@@ -289,25 +290,31 @@ TEST(AdaptiveCurvature, TheNodesOfAMaskAreInsideItsBoundary) {
 }
 
 TEST(AdaptiveCurvature, AnchorsStandForAFitAtEveryVertex) {
-    // A mask with waves: the radius of its choice, and every vertex fitted at that radius.
+    // A mask with waves.
     const auto waves = [](const Vec3d& p) {
         const double r = p.norm(), flat = std::hypot(p[0], p[1]) / std::max(r, 1e-9);
         return r <= 18 + 2.5 * std::sin(3 * std::atan2(p[1], p[0])) * std::pow(flat, 3) ? 1.0 : 0.0;
     };
     const TriMesh mesh = marching_cubes(
         test::map_from_function(Vec3i::Constant(46), test::centred_frame(46, 1), waves), {0.5});
-    const AdaptiveCurvature chosen = adaptive_curvature(mesh);
-    AdaptiveCurvatureOptions options;
-    options.radius = chosen.radius;
-    ASSERT_GT(chosen.radius, 8);
-    const Curvatures each = adaptive_curvature(mesh, options);
+    const FitSurface surface(mesh);
+    const ScaledFits fits(surface, mesh_spacing(surface, true));
+    const FitScale scale{2, 0, 10, false};
+    ASSERT_TRUE(is_wide(fits, scale));
+    Curvatures out;
+    out.flags = curvature_flags(mesh, "test");
+    out.resize(mesh.points.size(), true);
+    fit_by_anchors(fits, scale, out, {});
+    PatchFit patch(surface);
+    FittedCurvature k;
     double off = 0, size = 0, aside = 0;
-    for (std::size_t v = 0; v < each.size(); ++v) {
-        off += std::hypot(chosen.k1[v] - each.k1[v], chosen.k2[v] - each.k2[v]);
-        size += std::hypot(each.k1[v], each.k2[v]);
-        const double split = each.k1[v] - each.k2[v];
-        aside += split * (1 - std::abs(static_cast<double>(chosen.direction1[v].dot(each.direction1[v]))));
-        EXPECT_NEAR(chosen.direction1[v].dot(chosen.direction2[v]), 0, 1e-5);
+    for (VertexId v = 0; v < out.size(); ++v) {
+        ASSERT_TRUE(fits.fit(patch, v, scale, k));
+        off += std::hypot(out.k1[v] - k.k1, out.k2[v] - k.k2);
+        size += std::hypot(k.k1, k.k2);
+        aside += (k.k1 - k.k2) * (1 - std::abs(k.direction1.dot(out.direction1[v].cast<double>())));
+        EXPECT_NEAR(out.direction1[v].dot(out.direction2[v]), 0, 1e-5);
+        EXPECT_NEAR(k.normal.dot(out.direction1[v].cast<double>()), 0, 0.1);
     }
     EXPECT_LT(off, 0.03 * size);
     EXPECT_LT(aside, 0.01 * size);

@@ -38,16 +38,6 @@ FitScale chosen_scale(FitSurface& surface, const ScaledFits& fits, const Array<s
     return moved.scale;
 }
 
-double median_radius(const ScaledFits& fits, const Array<std::uint8_t>& flags, const FitScale& scale) {
-    std::vector<double> all;
-    for (std::size_t v = 0; v < flags.size(); ++v)
-        if (!(flags[v] & curvature_undefined)) all.push_back(fits.radius(static_cast<VertexId>(v), scale));
-    if (all.empty()) return 0;
-    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
-    return *middle;
-}
-
 void fit_each(const ScaledFits& scaled, const FitScale& scale, Curvatures& out, const Progress& progress) {
     tbb::enumerable_thread_specific<PatchFit> fits([&] { return PatchFit(scaled.surface()); });
     std::atomic<std::size_t> done{0};
@@ -94,10 +84,10 @@ AdaptiveCurvature adaptive_curvature(const TriMesh& mesh, const AdaptiveCurvatur
         scale = {2, 0, *options.radius, true};
     else
         scale = chosen_scale(surface, scaled, out.flags, lattice.has_value(), std::move(shifts));
-    out.radius = median_radius(scaled, out.flags, scale);
+    out.radius = scale.radius(scaled.median_spacing());
     progress.report(0.4);
 
-    if (is_wide(scale))
+    if (is_wide(scaled, scale))
         fit_by_anchors(scaled, scale, out, progress.part(0.4, 1));
     else
         fit_each(scaled, scale, out, progress.part(0.4, 1));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/measure/curvature.h"
@@ -93,6 +94,14 @@ double relative_change(const std::vector<Estimate>& narrow, const std::vector<Es
 }
 
 }  // namespace
+
+ScaledFits::ScaledFits(const FitSurface& surface, Array<float> spacing)
+    : surface_(surface), spacing_(std::move(spacing)) {
+    std::vector<double> all;
+    for (const float s : spacing_)
+        if (s > 0) all.push_back(static_cast<double>(s));
+    if (!all.empty()) median_ = quantile(all, 0.5);
+}
 
 bool ScaledFits::fit(PatchFit& patch, VertexId v, const FitScale& s, FittedCurvature& out) const {
     return s.rings > 0 ? patch.rings(v, s.rings, s.degree, out) : patch.ball(v, radius(v, s), s.degree, out);

@@ -20,12 +20,18 @@ struct FitScale {
 /// Fits at one scale after another; see adaptive_curvature for the choice.
 class ScaledFits {
  public:
-    ScaledFits(const FitSurface& surface, Array<float> spacing)
-        : surface_(surface), spacing_(std::move(spacing)) {}
+    /// `spacing` of the mesh at each vertex, Å.
+    ScaledFits(const FitSurface& surface, Array<float> spacing);
 
     const FitSurface& surface() const { return surface_; }
     /// The ball's radius; for k rings k spacings.
     double radius(VertexId v, const FitScale& s) const { return s.radius(static_cast<double>(spacing_[v])); }
+
+    /// The width of balls in spacings, the median where it varies.
+    double relative_width(const FitScale& s) const {
+        return s.absolute && median_ > 0 ? s.width / median_ : s.width;
+    }
+    double median_spacing() const { return median_; }
 
     /// False where the points do not determine the jet.
     bool fit(PatchFit& patch, VertexId v, const FitScale& s, FittedCurvature& out) const;
@@ -45,6 +51,7 @@ class ScaledFits {
  private:
     const FitSurface& surface_;
     Array<float> spacing_;
+    double median_ = 0;
 };
 
 /// At each vertex the edge of the equilateral triangles of which the mesh around has as many vertices per

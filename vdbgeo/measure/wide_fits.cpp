@@ -104,7 +104,9 @@ class Blender {
 
 }  // namespace
 
-bool is_wide(const FitScale& scale) { return scale.rings == 0 && !scale.absolute && scale.width >= wide; }
+bool is_wide(const ScaledFits& fits, const FitScale& scale) {
+    return scale.rings == 0 && fits.relative_width(scale) >= wide;
+}
 
 void fit_by_anchors(const ScaledFits& fits, const FitScale& scale, Curvatures& out,
                     const Progress& progress) {

@@ -8,7 +8,7 @@
 namespace vdbgeo {
 
 /// Whether neighbourhoods are so wide, 9.6 spacings or more, that those next to each other hardly differ.
-bool is_wide(const FitScale& scale);
+bool is_wide(const ScaledFits& fits, const FitScale& scale);
 
 /// Fits at anchors no more than r/8 from every vertex of the surface, r the radius of the neighbourhoods, and
 /// gives each vertex the mean of the shape operators of the anchors within r/4, turned into its tangent

@@ -14,6 +14,7 @@
 #include "vdbgeo/measure/discrete_curvature.h"
 #include "vdbgeo/measure/field_curvature.h"
 #include "vdbgeo/measure/jet_curvature.h"
+#include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/measure/normal_voting.h"
 #include "vdbgeo/measure/shape_types.h"
 #include "vdbgeo/measure/vertex_areas.h"
@@ -130,6 +131,18 @@ std::vector<MeshProperty> sampled(const CurvatureOptions& o, const TriMesh& mesh
     return all;
 }
 
+/// A mesh that encloses a negative volume has its faces turned inward; so has the wall of a cavity, but not
+/// the whole. The field does not look at the faces.
+void warn_where_inward(const TriMesh& mesh, const CurvatureOptions& o, Session& session) {
+    if (o.chosen() == "field") return;
+    const MeshMeasures m = measure_mesh(mesh);
+    if (m.volume_A3 && *m.volume_A3 < 0)
+        session.warn(
+            fmt::format("{}: its faces are turned inward, so what bulges has a negative curvature; repair "
+                        "turns them",
+                        o.in));
+}
+
 void put(TriMesh& mesh, const MeshProperty& property) {
     for (MeshProperty& p : mesh.vertex_properties)
         if (p.name == property.name) {
@@ -149,12 +162,13 @@ void run_curvature(const CurvatureOptions& o, Session& session) {
     Clock clock;
     TriMesh mesh = read_mesh(o.in, session.stage("reading"));
     seconds["read"] = clock.lap();
+    warn_where_inward(mesh, o, session);
     Array<double> areas;
     const Curvatures curvature = naming(o.in, [&] { return estimate(o, mesh, areas, j, session); });
     if (areas.empty()) areas = vertex_areas(mesh);
     seconds["compute"] = clock.lap();
-    CurvatureReport report{mesh, curvature, areas, o.flatness.value_or(default_flatness(curvature, areas)),
-                           sampled(o, mesh, session)};
+    const double flatness = o.flatness ? *o.flatness : default_flatness(curvature, as_weights(areas));
+    CurvatureReport report{mesh, curvature, std::move(areas), flatness, sampled(o, mesh, session)};
     j.update(curvature_json(report));
     seconds["report"] = clock.lap();
     attach(mesh, curvature, report.flatness);

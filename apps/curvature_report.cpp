@@ -54,13 +54,6 @@ std::vector<double> area_in_bins(const Array<double>& values, const Array<double
     return area;
 }
 
-/// The areas as weights.
-Array<double> weights_of(const CurvatureReport& r) {
-    Array<double> weights = r.areas;
-    for (double& w : weights) w = std::isfinite(w) ? std::max(w, 0.0) : 0;
-    return weights;
-}
-
 /// Σ value · area over the vertices that have a value.
 template <class Value>
 double integral(const CurvatureReport& r, const Value& value) {
@@ -77,9 +70,14 @@ std::string distribution_text(const char* name, const AreaHistogram& h, const ch
 
 }  // namespace
 
+Array<double> as_weights(Array<double> areas) {
+    for (double& a : areas) a = std::isfinite(a) ? std::max(a, 0.0) : 0;
+    return areas;
+}
+
 Json curvature_json(const CurvatureReport& r) {
     const Curvatures& c = r.curvature;
-    const Array<double> weights = weights_of(r);
+    const Array<double> weights = as_weights(r.areas);
     Json j{{"vertices", c.size()},
            {"faces", r.mesh.triangles.size()},
            {"undefined", with_flag(c, curvature_undefined)},
@@ -112,7 +110,7 @@ Json curvature_json(const CurvatureReport& r) {
 
 std::vector<std::string> curvature_text(const CurvatureReport& r) {
     const Curvatures& c = r.curvature;
-    const Array<double> weights = weights_of(r);
+    const Array<double> weights = as_weights(r.areas);
     std::vector<std::string> lines{
         fmt::format("vertices    {}, {} at borders, {} on caps, {} without a value", c.size(),
                     with_flag(c, curvature_border), with_flag(c, curvature_cap),
@@ -187,7 +185,7 @@ void write_curvature_histogram(const CurvatureReport& r, const std::string& path
     options.x_label = "curvature (1/Å)";
     options.y_label = "share of the area, % a bin";
     const Curvatures& c = r.curvature;
-    const Array<double> weights = weights_of(r);
+    const Array<double> weights = as_weights(r.areas);
     // One axis for the three: from the least to the greatest of what 98 % of the area has.
     double low = 0, high = 0;
     for (const Array<double>* values : {&c.k1, &c.k2}) {

@@ -14,15 +14,17 @@ struct CurvatureReport {
     const TriMesh& mesh;
     const Curvatures& curvature;
     /// Of the vertices, Å²: of the method's own dual cells where it has some, so that ∫K dA = Σ K A is exact.
-    /// Cells of no or negative area (Eq 14 knows such) count in integrals only.
-    const Array<double>& areas;
+    Array<double> areas;
     double flatness = 0;                ///< of the surface types, 1/Å
     std::vector<MeshProperty> sampled;  ///< values of maps at the vertices
 };
 
+/// The areas as weights: what is negative or no number is 0.
+Array<double> as_weights(Array<double> areas);
+
 /// Counts, area-weighted distributions of H, K, k1, k2, shape_index and curvedness, area by surface type,
 /// ∫K dA, ∫H² dA, and the distribution of every sampled value.
-/// Distributions leave out what has no area.
+/// Cells of negative area (Eq 14 knows such) count in integrals only.
 Json curvature_json(const CurvatureReport& report);
 std::vector<std::string> curvature_text(const CurvatureReport& report);
 

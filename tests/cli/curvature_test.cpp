@@ -148,3 +148,10 @@ TEST_F(Curvature, SameBytesForAnyThreads) {
         EXPECT_EQ(outputs.size(), 1u);
     }
 }
+
+TEST_F(Curvature, SaysWhereFacesAreTurnedInward) {
+    vdbgeo::write_mesh(flipped(icosphere(3, 5)), at("inward.ply"));
+    const Ended r = good({"curvature", at("inward.ply"), at("i.ply"), "--quiet"});
+    EXPECT_NE(r.err.find("turned inward"), std::string::npos) << r.err;
+    EXPECT_EQ(good({"curvature", mesh_, at("o.ply"), "--quiet"}).err, "");
+}

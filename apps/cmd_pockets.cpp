@@ -253,7 +253,7 @@ Command pockets_command() {
                 app.add_option("--k1-below", p.k1_below,
                                "Pockets: and k1 not above this, in 1/Å; inf: no bound [c]")
                     ->excludes(protrusions);
-                app.add_option("--k1-above", p.k1_above, "Protrusions: k1 above this, in 1/Å [2 c]")
+                app.add_option("--k1-above", p.k1_above, "Protrusions: k1 above this, in 1/Å [2 c or less]")
                     ->needs(protrusions);
                 app.add_option(
                     "--min-area", p.min_area,

@@ -410,9 +410,8 @@ TEST(FieldCurvature, OfANoisyMapIsThatOfItsRemeshedSurface) {
     const DensityMap map = noisy_phantom(8, 64);
     const TriMesh mesh = surface_of(map, 0.5);
     const TriMesh remeshed = isotropic_remesh(mesh);
-    const FieldCurvature a = field_curvature(mesh, map);
-    const FieldCurvature b = field_curvature(remeshed, map, at_scale(a.scale));
-    EXPECT_GT(a.scale, 1);
+    const FieldCurvature a = field_curvature(mesh, map, at_scale(2));
+    const FieldCurvature b = field_curvature(remeshed, map, at_scale(2));
     const TriangleTree tree(mesh);
     double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
     for (std::size_t v = 0; v < b.size(); ++v) {

@@ -25,6 +25,10 @@ constexpr std::size_t longest_run = 1 << 11;
 
 /// What the choice of a scale goes through, and what it asks for.
 constexpr double scales[] = {1, 1.5, 2, 2.5, 3, 4};
+/// Where the first of these already moves the surface, and how far it may: voxels, the median.
+constexpr double sharp_scale = 0.7, furthest = 0.25;
+/// Sees the samples as they are, near enough.
+constexpr double bare_scale = 0.5;
 constexpr std::size_t tried_cubes = 96, tried_vertices = 24;
 constexpr double tried_step = 0.5;  // voxels along the surface
 constexpr double agreement = 0.985;
@@ -124,6 +128,12 @@ void Cubes::sort_by(int edge) {
     runs_.push_back(order_.size());
 }
 
+openvdb::Coord cube_of(const Vec3d& index, int edge) {
+    openvdb::Coord corner;
+    for (int a = 0; a < 3; ++a) corner[a] = edge * static_cast<int>(std::floor(index[a] / edge));
+    return corner;
+}
+
 struct Principal {
     double k1, k2;
     Vec3d along1, along2;
@@ -201,6 +211,39 @@ double disagreement(const Cubes& cubes, const DensityMap& map, const Width& widt
     return sums.all > 0 ? sums.difference / sums.all : 0;
 }
 
+/// How far a gaussian moves the surface: the median over some vertices of the change of the density there
+/// over the slope, in voxels of the finest axis. Vertices without a slope count as moved.
+double displacement(Cubes& cubes, const DensityMap& map, const Width& width) {
+    const Width bare(map.frame, bare_scale);
+    const double voxel = map.frame.voxel_size().minCoeff();
+    const std::size_t tried = std::min(tried_cubes, cubes.runs());
+    std::vector<double> moved(tried * tried_vertices, -1.0);
+    parallel_blocks(tried, 8, [&](std::size_t from, std::size_t to) {
+        SmoothedView view(map, width.samples), sharp(map, bare.samples);
+        for (std::size_t t = from; t < to; ++t) {
+            const std::size_t run = t * cubes.runs() / tried;
+            view.move_to(cubes.corner(run));
+            const std::size_t count = cubes.end(run) - cubes.begin(run);
+            const std::size_t wanted = std::min(count, tried_vertices);
+            for (std::size_t w = 0; w < wanted; ++w) {
+                const Vec3d at = cubes.index(cubes.vertex(cubes.begin(run) + w * count / wanted));
+                Derivatives seen, own;
+                if (!view.derivatives(at, seen)) continue;
+                sharp.move_to(cube_of(at, SmoothedView::edge_for(bare.samples)));
+                if (!sharp.derivatives(at, own)) continue;
+                const double slope = (cubes.to_index().transpose() * seen.gradient).norm() * voxel;
+                const double change = std::abs(seen.value - own.value);
+                moved[t * tried_vertices + w] = change < slope * 1e3 ? change / slope : 1e3;
+            }
+        }
+    });
+    moved.erase(std::remove(moved.begin(), moved.end(), -1.0), moved.end());
+    if (moved.empty()) return 0;
+    const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
+    std::nth_element(moved.begin(), middle, moved.end());
+    return *middle;
+}
+
 /// Whether nine of ten of the tried cubes are those of a mask.
 bool is_mask(const Cubes& cubes, const DensityMap& map, const Width& width) {
     const std::size_t tried = std::min(tried_cubes, cubes.runs());
@@ -217,10 +260,11 @@ double choose_scale(Cubes& cubes, const DensityMap& map, bool level_set) {
     const Width first(map.frame, scales[0]);
     cubes.sort_by(SmoothedView::edge_for(first.samples));
     if (is_mask(cubes, map, first)) return mask_scale;
-    double best = scales[0], least = std::numeric_limits<double>::infinity();
+    double best = sharp_scale, least = std::numeric_limits<double>::infinity();
     for (const double scale : scales) {
         const Width width(map.frame, scale);
         cubes.sort_by(SmoothedView::edge_for(width.samples));
+        if (displacement(cubes, map, width) > furthest) break;
         const double found = disagreement(cubes, map, width, level_set);
         if (found <= 1 - agreement) return scale;
         if (found < least) {

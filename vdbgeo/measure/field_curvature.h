@@ -39,10 +39,11 @@ struct FieldCurvature : Curvatures {
 ///
 /// **Scale** when none is given: the smallest of 1, 1.5, 2, 2.5, 3, 4 voxels at which, at up to 2300 vertices
 /// of 96 blocks, half a voxel along the surface changes k1 and k2 by under 1.5 % of their mean square (Σ|Δk|²
-/// against Σ|k|² of both places); the one that changes least where none does. Clean maps get 1. A mask (at
-/// most three values around nine of ten blocks) gets 5. So it is the scale at which curvature does not depend
-/// on where exactly the vertices are; errors that are smoother than σ pass. Each mesh chooses its own: give
-/// the scale where two meshes are to be compared. What it gives on real maps is in docs/accuracy.md.
+/// against Σ|k|² of both places); but none that moves the surface by more than a quarter of a voxel (median
+/// of the change of the density over its slope), since what it shows is then the curvature of another body:
+/// 0.7 where 1 does so already, and where none is steady the steadiest of the others. Clean maps get 1. A
+/// mask (at most three values around nine of ten blocks) gets 5. Each mesh chooses its own: give the scale
+/// where two meshes are to be compared. docs/accuracy.md has what scales do to real maps.
 ///
 /// Masks: median and 95 % error of k1 of a ball of ones among zeros, of 10 voxels' radius 6.9 and 17 % at
 /// scale 2, 1.4 and 3.8 % at 4, 1.5 and 4.0 % at 5, 2.6 and 5.3 % at 6; of 30 voxels' 16 and 54 %, 2.1 and

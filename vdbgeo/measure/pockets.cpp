@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t none = 0xFFFFFFFFu;
 /// Of the median curvedness: what pockets and protrusions are sharper than. Chosen by looking at maps.
-constexpr double pocket_share = 0.5, protrusion_share = 2;
+constexpr double pocket_share = 0.5, protrusion_share = 2, least_protrusion_share = 1.25;
 /// Patches of no more vertices are roughness.
 constexpr double few_vertices = 20;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -41,6 +41,7 @@ struct Search {
     std::vector<std::uint32_t> patch{};  ///< of each of them
     std::vector<Pocket> list{};          ///< by patch
 
+    double protrusion_bound(double median) const;
     void choose_bounds(Pockets& found);
     void find_vertices(double k1_below);
     void find_patches(double min_persistence, double min_area);
@@ -48,6 +49,11 @@ struct Search {
     void find_rims();
     void rank(Pockets& found) const;
 };
+
+double Search::protrusion_bound(double median) const {
+    const double rare = area_histogram(curvature.k1, areas, 1).p95;
+    return std::max(least_protrusion_share * median, std::min(protrusion_share * median, rare));
+}
 
 void Search::choose_bounds(Pockets& found) {
     value.resize(mesh.points.size());
@@ -58,7 +64,7 @@ void Search::choose_bounds(Pockets& found) {
     });
     const double median = area_histogram(bend, areas, 1).median;
     found.threshold = pocket ? options.k2_below.value_or(-pocket_share * median)
-                             : options.k1_above.value_or(protrusion_share * median);
+                             : options.k1_above.value_or(protrusion_bound(median));
     level = pocket ? found.threshold : -found.threshold;
     found.k1_below = pocket ? options.k1_below.value_or(median) : infinity;
     const double sharp = std::max(std::abs(found.threshold), median);

@@ -20,7 +20,8 @@ struct PocketOptions {
     /// Pockets: and k1 not above this, 1/Å (infinity: no bound). None: c: … and outward no more than is
     /// typical, which leaves out necks and the flanks of ridges.
     std::optional<double> k1_below;
-    /// Protrusions: k1 above this, 1/Å. None: 2 c.
+    /// Protrusions: k1 above this, 1/Å. None: 2 c, or the 95th percentile of k1 by area where that is less
+    /// (a wide gaussian bounds the curvature of a field), but 1.25 c at least: a sphere has none.
     std::optional<double> k1_above;
     /// Å²: smaller patches are roughness. None: the smaller of 1/s², s the larger of |threshold| and c, and
     /// of 20 vertices' mean area.

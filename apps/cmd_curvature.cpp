@@ -143,15 +143,6 @@ void warn_where_inward(const TriMesh& mesh, const CurvatureOptions& o, Session& 
                         o.in));
 }
 
-void put(TriMesh& mesh, const MeshProperty& property) {
-    for (MeshProperty& p : mesh.vertex_properties)
-        if (p.name == property.name) {
-            p = property;
-            return;
-        }
-    mesh.vertex_properties.push_back(property);
-}
-
 void run_curvature(const CurvatureOptions& o, Session& session) {
     check_mesh_output(o.out);
     for (const char* ending : {".obj", ".off", ".stl"})
@@ -172,7 +163,7 @@ void run_curvature(const CurvatureOptions& o, Session& session) {
     j.update(curvature_json(report));
     seconds["report"] = clock.lap();
     attach(mesh, curvature, report.flatness);
-    for (const MeshProperty& p : report.sampled) put(mesh, p);
+    for (const MeshProperty& p : report.sampled) set_vertex_property(mesh, p);
     if (!o.table.empty()) write_curvature_table(report, o.table, session.stage("table"));
     if (!o.histogram.empty()) write_curvature_histogram(report, o.histogram);
     write_mesh(mesh, o.out, {}, session.stage("writing"));

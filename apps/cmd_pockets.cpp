@@ -204,11 +204,7 @@ void run_pockets(const PocketsCommandOptions& o, Session& session) {
     all["list"] = rows;
     if (!o.mesh.empty()) {
         TriMesh marked = std::move(mesh);
-        auto& properties = marked.vertex_properties;
-        properties.erase(std::remove_if(properties.begin(), properties.end(),
-                                        [&](const MeshProperty& p) { return p.name == o.kind(); }),
-                         properties.end());
-        properties.push_back(id_property(found, o.kind(), 0));
+        set_vertex_property(marked, id_property(found, o.kind(), 0));
         write_mesh(marked, o.mesh, {}, session.stage("writing"));
     }
     if (!o.picture.empty()) write_png(image, o.picture);

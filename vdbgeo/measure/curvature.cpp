@@ -15,15 +15,6 @@ namespace {
 
 constexpr std::size_t grain = 1 << 12;
 
-void put(TriMesh& mesh, MeshProperty property) {
-    for (MeshProperty& p : mesh.vertex_properties)
-        if (p.name == property.name) {
-            p = std::move(property);
-            return;
-        }
-    mesh.vertex_properties.push_back(std::move(property));
-}
-
 template <class Value>
 MeshProperty scalars(const char* name, std::size_t count, const Value& value) {
     MeshProperty p{name, 1, std::vector<float>(count)};
@@ -81,25 +72,34 @@ Vec3d with_stable_sign(const Vec3d& axis) {
     return axis[largest] < 0 ? Vec3d(-axis) : axis;
 }
 
+void set_vertex_property(TriMesh& mesh, MeshProperty property) {
+    for (MeshProperty& p : mesh.vertex_properties)
+        if (p.name == property.name) {
+            p = std::move(property);
+            return;
+        }
+    mesh.vertex_properties.push_back(std::move(property));
+}
+
 void attach(TriMesh& mesh, const Curvatures& c, double flatness) {
     const std::size_t n = c.size();
-    put(mesh, scalars("K", n, [&](std::size_t v) { return c.K[v]; }));
-    put(mesh, scalars("H", n, [&](std::size_t v) { return c.H[v]; }));
-    put(mesh, scalars("k1", n, [&](std::size_t v) { return c.k1[v]; }));
-    put(mesh, scalars("k2", n, [&](std::size_t v) { return c.k2[v]; }));
+    set_vertex_property(mesh, scalars("K", n, [&](std::size_t v) { return c.K[v]; }));
+    set_vertex_property(mesh, scalars("H", n, [&](std::size_t v) { return c.H[v]; }));
+    set_vertex_property(mesh, scalars("k1", n, [&](std::size_t v) { return c.k1[v]; }));
+    set_vertex_property(mesh, scalars("k2", n, [&](std::size_t v) { return c.k2[v]; }));
     const double none = std::numeric_limits<double>::quiet_NaN();
     const auto where_defined = [&](const char* name, const auto& value) {
-        put(mesh, scalars(name, n, [&](std::size_t v) {
-                return c.defined(v) ? static_cast<double>(value(c.k1[v], c.k2[v])) : none;
-            }));
+        set_vertex_property(mesh, scalars(name, n, [&](std::size_t v) {
+                                return c.defined(v) ? static_cast<double>(value(c.k1[v], c.k2[v])) : none;
+                            }));
     };
     where_defined("shape_index", shape_index);
     where_defined("curvedness", curvedness);
     where_defined("type", [&](double k1, double k2) { return int(surface_type(k1, k2, flatness)); });
-    put(mesh, scalars("curvature_flags", n, [&](std::size_t v) { return c.flags[v]; }));
+    set_vertex_property(mesh, scalars("curvature_flags", n, [&](std::size_t v) { return c.flags[v]; }));
     if (!c.has_directions()) return;
-    put(mesh, vectors("direction1", c.direction1));
-    put(mesh, vectors("direction2", c.direction2));
+    set_vertex_property(mesh, vectors("direction1", c.direction1));
+    set_vertex_property(mesh, vectors("direction2", c.direction2));
 }
 
 Array<std::uint8_t> curvature_flags(const TriMesh& mesh, const char* stage) {

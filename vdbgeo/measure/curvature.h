@@ -45,6 +45,9 @@ struct Curvatures {
 /// the algorithm's path.
 Vec3d with_stable_sign(const Vec3d& axis);
 
+/// Puts a property of the vertices into the mesh, in place of one of the same name where there is one.
+void set_vertex_property(TriMesh& mesh, MeshProperty property);
+
 /// Puts the curvature into the mesh as vertex properties: K, H, k1, k2, shape_index, curvedness, type (the
 /// number of a SurfaceType), curvature_flags, and direction1, direction2 (3 components) where there are any.
 /// Properties of these names are replaced.

@@ -165,43 +165,47 @@ bool principal(const Derivatives& in, const Mat3d& to_index, double sigma, bool 
     return true;
 }
 
+/// The number of cubes that a choice looks at.
+std::size_t tried_runs(const Cubes& cubes) { return std::min(tried_cubes, cubes.runs()); }
+
+/// Moves the view to one of them and calls visit(w, index) for some of its vertices, w = 0, 1, ….
+template <class Visit>
+void visit_tried(const Cubes& cubes, std::size_t t, SmoothedView& view, const Visit& visit) {
+    const std::size_t run = t * cubes.runs() / tried_runs(cubes);
+    view.move_to(cubes.corner(run));
+    const std::size_t count = cubes.end(run) - cubes.begin(run), wanted = std::min(count, tried_vertices);
+    for (std::size_t w = 0; w < wanted; ++w)
+        visit(w, cubes.index(cubes.vertex(cubes.begin(run) + w * count / wanted)));
+}
+
 /// How much of the curvature changes over half a voxel along the surface: Σ|Δk|² over 2 Σ|k|², at some
 /// vertices of some cubes.
 double disagreement(const Cubes& cubes, const DensityMap& map, const Width& width, bool level_set) {
     struct Sums {
         double difference = 0, all = 0;
     };
-    const std::size_t tried = std::min(tried_cubes, cubes.runs());
     const double step = tried_step * map.frame.voxel_size().minCoeff();
     const Sums sums = fixed_order_reduce(
-        tried, 8, Sums{},
+        tried_runs(cubes), 8, Sums{},
         [&](std::size_t from, std::size_t to) {
             SmoothedView view(map, width.samples);
             Sums s;
-            for (std::size_t t = from; t < to; ++t) {
-                const std::size_t run = t * cubes.runs() / tried;
-                view.move_to(cubes.corner(run));
-                const std::size_t count = cubes.end(run) - cubes.begin(run);
-                const std::size_t wanted = std::min(count, tried_vertices);
-                for (std::size_t w = 0; w < wanted; ++w) {
-                    const Vec3d at = cubes.index(cubes.vertex(cubes.begin(run) + w * count / wanted));
-                    Derivatives d;
-                    Principal here, there;
-                    if (!view.derivatives(at, d) ||
-                        !principal(d, cubes.to_index(), width.sigma, level_set, here))
-                        continue;
-                    // Half way between the two directions, so that both values change.
-                    const Vec3d aside = step * M_SQRT1_2 * (here.along1 + here.along2);
-                    Vec3d next = at + cubes.to_index() * aside;
-                    if (!view.holds(next)) next = at - cubes.to_index() * aside;
-                    if (!view.holds(next) || !view.derivatives(next, d) ||
-                        !principal(d, cubes.to_index(), width.sigma, level_set, there))
-                        continue;
-                    s.difference += std::pow(here.k1 - there.k1, 2) + std::pow(here.k2 - there.k2, 2);
-                    s.all +=
-                        here.k1 * here.k1 + here.k2 * here.k2 + there.k1 * there.k1 + there.k2 * there.k2;
-                }
-            }
+            const auto add = [&](std::size_t, const Vec3d& at) {
+                Derivatives d;
+                Principal here, there;
+                if (!view.derivatives(at, d) || !principal(d, cubes.to_index(), width.sigma, level_set, here))
+                    return;
+                // Half way between the two directions, so that both values change.
+                const Vec3d aside = step * M_SQRT1_2 * (here.along1 + here.along2);
+                Vec3d next = at + cubes.to_index() * aside;
+                if (!view.holds(next)) next = at - cubes.to_index() * aside;
+                if (!view.holds(next) || !view.derivatives(next, d) ||
+                    !principal(d, cubes.to_index(), width.sigma, level_set, there))
+                    return;
+                s.difference += std::pow(here.k1 - there.k1, 2) + std::pow(here.k2 - there.k2, 2);
+                s.all += here.k1 * here.k1 + here.k2 * here.k2 + there.k1 * there.k1 + there.k2 * there.k2;
+            };
+            for (std::size_t t = from; t < to; ++t) visit_tried(cubes, t, view, add);
             return s;
         },
         [](Sums& to, const Sums& part) {
@@ -213,29 +217,23 @@ double disagreement(const Cubes& cubes, const DensityMap& map, const Width& widt
 
 /// How far a gaussian moves the surface: the median over some vertices of the change of the density there
 /// over the slope, in voxels of the finest axis. Vertices without a slope count as moved.
-double displacement(Cubes& cubes, const DensityMap& map, const Width& width) {
+double displacement(const Cubes& cubes, const DensityMap& map, const Width& width) {
     const Width bare(map.frame, bare_scale);
+    const int edge = SmoothedView::edge_for(bare.samples);
     const double voxel = map.frame.voxel_size().minCoeff();
-    const std::size_t tried = std::min(tried_cubes, cubes.runs());
-    std::vector<double> moved(tried * tried_vertices, -1.0);
-    parallel_blocks(tried, 8, [&](std::size_t from, std::size_t to) {
+    std::vector<double> moved(tried_runs(cubes) * tried_vertices, -1.0);
+    parallel_blocks(tried_runs(cubes), 8, [&](std::size_t from, std::size_t to) {
         SmoothedView view(map, width.samples), sharp(map, bare.samples);
-        for (std::size_t t = from; t < to; ++t) {
-            const std::size_t run = t * cubes.runs() / tried;
-            view.move_to(cubes.corner(run));
-            const std::size_t count = cubes.end(run) - cubes.begin(run);
-            const std::size_t wanted = std::min(count, tried_vertices);
-            for (std::size_t w = 0; w < wanted; ++w) {
-                const Vec3d at = cubes.index(cubes.vertex(cubes.begin(run) + w * count / wanted));
+        for (std::size_t t = from; t < to; ++t)
+            visit_tried(cubes, t, view, [&](std::size_t w, const Vec3d& at) {
                 Derivatives seen, own;
-                if (!view.derivatives(at, seen)) continue;
-                sharp.move_to(cube_of(at, SmoothedView::edge_for(bare.samples)));
-                if (!sharp.derivatives(at, own)) continue;
+                if (!view.derivatives(at, seen)) return;
+                sharp.move_to(cube_of(at, edge));
+                if (!sharp.derivatives(at, own)) return;
                 const double slope = (cubes.to_index().transpose() * seen.gradient).norm() * voxel;
                 const double change = std::abs(seen.value - own.value);
                 moved[t * tried_vertices + w] = change < slope * 1e3 ? change / slope : 1e3;
-            }
-        }
+            });
     });
     moved.erase(std::remove(moved.begin(), moved.end(), -1.0), moved.end());
     if (moved.empty()) return 0;
@@ -246,7 +244,7 @@ double displacement(Cubes& cubes, const DensityMap& map, const Width& width) {
 
 /// Whether nine of ten of the tried cubes are those of a mask.
 bool is_mask(const Cubes& cubes, const DensityMap& map, const Width& width) {
-    const std::size_t tried = std::min(tried_cubes, cubes.runs());
+    const std::size_t tried = tried_runs(cubes);
     SmoothedView view(map, width.samples);
     std::size_t found = 0;
     for (std::size_t t = 0; t < tried; ++t) {

@@ -77,6 +77,7 @@ Command components_command() {
                 app.add_flag("--split", o->split,
                              "One file a piece, the largest first: OUT_0001.ply and so on");
                 app.add_option("--list", o->list, "List this many pieces, the largest first")
+                    ->check(CLI::NonNegativeNumber.description(""))
                     ->capture_default_str();
                 return [o](Session& session) {
                     check_usage(o->flags.filter);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 
 #include "apps/command.h"
 #include "apps/curvature_report.h"
@@ -62,8 +63,25 @@ void check_sample(const std::string& text) {
     const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
     if (!std::all_of(name.begin(), name.end(), plain))
         throw UsageError(fmt::format("--sample {}: a name has letters, digits and _", text));
-    static const char* const taken[] = {"K",    "H",           "k1",         "k2",
-                                        "type", "shape_index", "curvedness", "curvature_flags"};
+    static const char* const taken[] = {"K",
+                                        "H",
+                                        "k1",
+                                        "k2",
+                                        "type",
+                                        "shape_index",
+                                        "curvedness",
+                                        "direction1",
+                                        "direction1_x",
+                                        "direction1_y",
+                                        "direction1_z",
+                                        "curvature_flags",
+                                        "direction2",
+                                        "x",
+                                        "y",
+                                        "z",
+                                        "direction2_x",
+                                        "direction2_y",
+                                        "direction2_z"};
     if (std::find(std::begin(taken), std::end(taken), name) != std::end(taken))
         throw UsageError(fmt::format("--sample {}: {} is the curvature's own", text, name));
 }
@@ -82,7 +100,20 @@ void finish(CurvatureOptions& o, const CLI::App& flags) {
     check_usage(o.adaptive);
     check_usage(o.field);
     check_usage(o.sampling);
-    for (const std::string& s : o.samples) check_sample(s);
+    std::set<std::string> names;
+    for (const std::string& s : o.samples) {
+        check_sample(s);
+        if (!names.insert(s.substr(0, s.find('='))).second)
+            throw UsageError(fmt::format("--sample {}: a name is there twice", s));
+    }
+    if (o.map.empty() && o.samples.empty())
+        refuse_flags(flags,
+                     {"--voxel-size", "--origin", "--mode0", "--volume", "--crop", "--bin", "--invert",
+                      "--normalise", "--grid"},
+                     "belongs to --map and --sample");
+    if (method == "jets" && o.radius) refuse_flags(flags, {"--rings"}, "means nothing with --radius");
+    if (method == "tensor" && o.tensor.neighbourhood == TensorNeighbourhood::ring)
+        refuse_flags(flags, {"--radius"}, "means nothing with --neighbourhood ring");
     if (o.flatness && !(*o.flatness >= 0)) throw UsageError("--flatness: expected 0 or more, in 1/Å");
     if (!o.table.empty() && !has_ending(o.table, ".csv"))
         throw UsageError(fmt::format("{}: tables are CSV files: .csv", o.table));
@@ -106,6 +137,7 @@ Curvatures estimate(const CurvatureOptions& o, const TriMesh& mesh, Array<double
         return c;
     }
     const Progress progress = session.stage("curvature");
+    if (o.radius) j["radius_A"] = *o.radius;
     if (method == "discrete") {
         DiscreteCurvature c = discrete_curvature(mesh, o.discrete, progress);
         areas = std::move(c.dual_area);
@@ -145,6 +177,7 @@ void warn_where_inward(const TriMesh& mesh, const CurvatureOptions& o, Session& 
 
 void run_curvature(const CurvatureOptions& o, Session& session) {
     check_mesh_output(o.out);
+    for (const std::string& path : {o.out, o.table, o.histogram}) check_folder_of(path);
     for (const char* ending : {".obj", ".off", ".stl"})
         if (has_ending(o.out, ending))
             session.warn(
@@ -158,6 +191,10 @@ void run_curvature(const CurvatureOptions& o, Session& session) {
     const Curvatures curvature = naming(o.in, [&] { return estimate(o, mesh, areas, j, session); });
     if (areas.empty()) areas = vertex_areas(mesh);
     seconds["compute"] = clock.lap();
+    if (curvature.size() > 0 && std::all_of(curvature.flags.begin(), curvature.flags.end(),
+                                            [](std::uint8_t f) { return f & curvature_undefined; }))
+        session.warn(
+            fmt::format("{}: no vertex has a value: too few faces, or the map does not reach it", o.in));
     const double flatness = o.flatness ? *o.flatness : default_flatness(curvature, as_weights(areas));
     CurvatureReport report{mesh, curvature, std::move(areas), flatness, sampled(o, mesh, session)};
     j.update(curvature_json(report));

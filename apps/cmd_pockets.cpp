@@ -73,32 +73,48 @@ Json pocket_json(const Pocket& p, const char* kind) {
 /// null where there is no number.
 Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
+/// The rows of a table under their names.
+struct Table {
+    Json names = Json::array(), rows = Json::array();
+};
+
 /// One row a patch; beside the columns above the mean over the patch of every other value that the mesh has
-/// at its vertices, as mean_NAME.
-Json rows_of(const Pockets& found, const TriMesh& mesh, const char* kind) {
+/// at its vertices, as mean_NAME (NAME_mean where that is taken).
+Table table_of(const Pockets& found, const TriMesh& mesh, const char* kind) {
     static const std::set<std::string> known{
         "K", "H", "k1", "k2", "shape_index", "curvedness", "type", "curvature_flags", "pocket", "protrusion"};
-    Json rows = Json::array();
-    for (const Pocket& p : found.list) rows.push_back(pocket_json(p, kind));
-    if (rows.empty()) return rows;
-    const Array<double> areas = vertex_areas(mesh);
+    Table table;
+    const Json blank = pocket_json({}, kind);
+    for (const auto& item : blank.items()) table.names.push_back(item.key());
+    for (const Pocket& p : found.list) table.rows.push_back(pocket_json(p, kind));
+    const Array<double> areas = found.list.empty() ? Array<double>(found.id.size()) : vertex_areas(mesh);
     for (const MeshProperty& p : mesh.vertex_properties) {
         if (p.components != 1 || known.count(p.name)) continue;
+        const std::string name = blank.contains("mean_" + p.name) ? p.name + "_mean" : "mean_" + p.name;
         const std::vector<double> means = means_over(found, p.values, areas);
-        for (std::size_t i = 0; i < means.size(); ++i) rows[i]["mean_" + p.name] = finite_json(means[i]);
+        table.names.push_back(name);
+        for (std::size_t i = 0; i < means.size(); ++i) table.rows[i][name] = finite_json(means[i]);
     }
-    return rows;
+    return table;
 }
 
-/// The rows under their names; a value that is none is an empty field.
-std::string csv(const Json& rows, const char* kind) {
-    const Json names = rows.empty() ? pocket_json({}, kind) : rows[0];
+/// Quoted where the text would be taken for several fields.
+std::string csv_field(const std::string& text) {
+    if (text.find_first_of(",\"\n") == std::string::npos) return text;
+    std::string quoted = "\"";
+    for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+    return quoted + "\"";
+}
+
+/// A value that is none is an empty field.
+std::string csv(const Table& table) {
     std::string text;
-    for (const auto& [name, value] : names.items()) text += (text.empty() ? "" : ",") + name;
-    for (const Json& row : rows) {
+    for (const Json& name : table.names)
+        text += (text.empty() ? "" : ",") + csv_field(name.get<std::string>());
+    for (const Json& row : table.rows) {
         std::string line;
-        for (const auto& [name, value] : row.items())
-            line += (line.empty() ? "" : ",") + (value.is_string() ? value.get<std::string>()
+        for (const Json& value : row)
+            line += (line.empty() ? "" : ",") + (value.is_string() ? csv_field(value.get<std::string>())
                                                  : value.is_null() ? ""
                                                                    : value.dump());
         text += "\n" + line;
@@ -171,6 +187,7 @@ void check_outputs(const PocketsCommandOptions& o, Session& session) {
     else if (!has_ending(o.out, ".csv") && !has_ending(o.out, ".json"))
         throw UsageError(fmt::format("{}: tables are .csv or .json files", o.out));
     if (!o.mesh.empty()) check_mesh_output(o.mesh);
+    for (const std::string& path : {o.out, o.mesh, o.picture}) check_folder_of(path);
     if (o.picture.empty()) return;
     if (!has_ending(o.picture, ".png"))
         throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.picture));
@@ -197,7 +214,8 @@ void run_pockets(const PocketsCommandOptions& o, Session& session) {
     Image image;
     if (!o.picture.empty())
         image = naming(o.in, [&] { return picture(o, mesh, found, session.stage("rendering")); });
-    Json rows = rows_of(found, mesh, o.kind());
+    const Table table = table_of(found, mesh, o.kind());
+    Json rows = table.rows;
     Json j{{"file", o.in}, {"curvature", own ? "of the file" : "computed"}};
     j.update(bounds_json(o, found));
     Json all = j;
@@ -208,7 +226,7 @@ void run_pockets(const PocketsCommandOptions& o, Session& session) {
         write_mesh(marked, o.mesh, {}, session.stage("writing"));
     }
     if (!o.picture.empty()) write_png(image, o.picture);
-    write_file(o.out, has_ending(o.out, ".json") ? json_text(all, 1) + "\n" : csv(rows, o.kind()));
+    write_file(o.out, has_ending(o.out, ".json") ? json_text(all, 1) + "\n" : csv(table));
     seconds["write"] = clock.lap();
     session.end_stage();
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(std::min(o.list, rows.size())), rows.end());
@@ -259,7 +277,9 @@ Command pockets_command() {
                 app.add_option("--ambient-radius", p.ambient_radius,
                                "Depth below what a ball of this radius rolls on, in Å [the convex hull]");
                 app.add_flag("--recompute", o->recompute, "Ignore k1 and k2 of the mesh's vertices");
-                app.add_option("--list", o->list, "List this many, the first by rank")->capture_default_str();
+                app.add_option("--list", o->list, "List this many, the first by rank")
+                    ->check(CLI::NonNegativeNumber.description(""))
+                    ->capture_default_str();
                 app.add_option("--mesh", o->mesh,
                                "Mesh to write, with the vertex property pocket (or protrusion): the id, 0 "
                                "for none [none]");

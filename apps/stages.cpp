@@ -106,6 +106,14 @@ std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& pa
     return names;
 }
 
+void check_folder_of(const std::string& path) {
+    if (path.empty() || path == "-") return;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    std::error_code error;
+    if (!folder.empty() && !std::filesystem::is_directory(folder, error))
+        throw IoError(fmt::format("{}: cannot be made: there is no folder {}", path, folder.string()));
+}
+
 void check_mesh_output(const std::string& path) {
     if (!is_mesh_ending(path))
         throw UsageError(fmt::format("{}: the ending tells the format: {}", path, mesh_endings_text()));

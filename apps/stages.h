@@ -60,6 +60,10 @@ void say_where_open(const MeshMeasures& measures, Session& session);
 /// One file a piece, by area, the largest first: OUT_0001.ply … Returns their names.
 std::vector<std::string> write_pieces(const TriMesh& mesh, const std::string& path, const Progress& progress);
 
+/// IoError unless the folder of an output file is there: for commands that write several, so that none is
+/// left when another cannot be made. An empty name and "-" need none.
+void check_folder_of(const std::string& path);
+
 /// UsageError unless a mesh can be written under this name.
 void check_mesh_output(const std::string& path);
 

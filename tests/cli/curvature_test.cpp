@@ -120,6 +120,12 @@ TEST_F(Curvature, RefusesWhatMakesNoSense) {
     fails({"--sample", "density"}, 2, "--sample density", "NAME=MAP");
     fails({"--sample", "a b=" + map_}, 2, "--sample a b=", "letters");
     fails({"--sample", "k1=" + map_}, 2, "--sample k1=", "own");
+    fails({"--sample", "x=" + map_}, 2, "--sample x=", "own");
+    fails({"--sample", "a=" + map_, "--sample", "a=" + map_}, 2, "--sample a=", "twice");
+    fails({"--voxel-size", "3"}, 2, "--voxel-size", "--map");
+    fails({"--method", "jets", "--rings", "3", "--radius", "5"}, 2, "--rings", "--radius");
+    fails({"--method", "tensor", "--neighbourhood", "ring", "--radius", "5"}, 2, "--radius", "ring");
+    fails({"--table", at("no/t.csv")}, 4, at("no/t.csv"), "no folder");
     fails({"--sample-offset", "1"}, 2, "--sample-offset", "--sample");
     fails({"--map", at("none.mrc")}, 4, at("none.mrc"));
     fails({"--table", at("t.txt")}, 2, at("t.txt"), ".csv");
@@ -154,4 +160,18 @@ TEST_F(Curvature, SaysWhereFacesAreTurnedInward) {
     const Ended r = good({"curvature", at("inward.ply"), at("i.ply"), "--quiet"});
     EXPECT_NE(r.err.find("turned inward"), std::string::npos) << r.err;
     EXPECT_EQ(good({"curvature", mesh_, at("o.ply"), "--quiet"}).err, "");
+}
+
+TEST_F(Curvature, LeavesNoDirectionsOfAnotherMethod) {
+    good({"curvature", mesh_, at("one.ply"), "--quiet"});
+    EXPECT_TRUE(written("one.ply").find_vertex_property("direction1"));
+    good({"curvature", at("one.ply"), at("two.ply"), "--method", "discrete", "--quiet"});
+    EXPECT_FALSE(written("two.ply").find_vertex_property("direction1"));
+    EXPECT_FALSE(written("two.ply").find_vertex_property("direction2"));
+}
+
+TEST_F(Curvature, OfAMeshThatTheMapDoesNotReachIsNone) {
+    const Json j = json({"curvature", mesh_, at("far.ply"), "--map", map_, "--origin", "5000,0,0"});
+    EXPECT_EQ(j["undefined"], j["vertices"]);
+    EXPECT_TRUE(j["H_per_A"]["mean"].is_null()) << j.dump();
 }

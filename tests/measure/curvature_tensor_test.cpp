@@ -312,6 +312,16 @@ TEST(CurvatureTensor, SmallAndOddMeshes) {
         EXPECT_THROW(tensor_curvature(test::cube(), ball(radius)), InvalidInput);
 }
 
+TEST(CurvatureTensor, OfAPieceSmallerThanTheBall) {
+    // The normals of all faces cancel; the vertex's own tell the tangent plane.
+    const Curvatures c = tensor_curvature(test::cube(), ball(100));
+    for (std::size_t v = 0; v < c.size(); ++v) {
+        ASSERT_TRUE(c.defined(v)) << v;
+        EXPECT_GT(c.H[v], 0);
+        EXPECT_NEAR(c.H[v], c.H[0], 1e-12);
+    }
+}
+
 TEST(CurvatureTensor, TheSameForAnyNumberOfThreads) {
     const TriMesh mesh = bumpy(test::torus_mesh(25, 10, 120, 60), 0.02f, 4);
     for (const TensorNeighbourhood kind : kinds) {

@@ -97,7 +97,14 @@ void attach(TriMesh& mesh, const Curvatures& c, double flatness) {
     where_defined("curvedness", curvedness);
     where_defined("type", [&](double k1, double k2) { return int(surface_type(k1, k2, flatness)); });
     set_vertex_property(mesh, scalars("curvature_flags", n, [&](std::size_t v) { return c.flags[v]; }));
-    if (!c.has_directions()) return;
+    if (!c.has_directions()) {
+        auto& all = mesh.vertex_properties;
+        all.erase(std::remove_if(
+                      all.begin(), all.end(),
+                      [](const MeshProperty& p) { return p.name == "direction1" || p.name == "direction2"; }),
+                  all.end());
+        return;
+    }
     set_vertex_property(mesh, vectors("direction1", c.direction1));
     set_vertex_property(mesh, vectors("direction2", c.direction2));
 }

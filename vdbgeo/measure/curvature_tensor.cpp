@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t grain = 1 << 11;
 constexpr double default_radius = 3;  // mean edges
+constexpr double least_normal = 0.1;  // share of the area that the normals of a neighbourhood add up to
 constexpr const char* stage = "curvature";
 
 /// What a neighbourhood adds up to.
@@ -55,7 +56,10 @@ class Gather {
             std::fill(stamp_.begin(), stamp_.end(), 0);
             now_ = 1;
         }
-        return kind_ == TensorNeighbourhood::ball ? over_ball(ring) : over_disc(ring);
+        Sums sums = kind_ == TensorNeighbourhood::ball ? over_ball(ring) : over_disc(ring);
+        // All round a small piece normals cancel; the vertex has its own.
+        if (sums.normal.norm() < least_normal * sums.area) sums.normal = over_ring(ring).normal;
+        return sums;
     }
 
  private:

@@ -161,12 +161,19 @@ Array<float> mesh_spacing(const FitSurface& surface, bool even) {
         return next;
     }
     const VertexNeighbours& n = surface.neighbours();
+    // Geometric means: one vertex with huge faces does not widen the neighbourhoods of all around it.
     for (int pass = 0; pass < 4; ++pass) {
         parallel_for(count, grain, [&](std::size_t v) {
-            double sum = static_cast<double>(areas[v]);
-            for (std::uint64_t e = n.begin[v]; e < n.begin[v + 1]; ++e)
-                sum += static_cast<double>(areas[n.neighbours[e]]);
-            next[v] = static_cast<float>(sum / static_cast<double>(n.begin[v + 1] - n.begin[v] + 1));
+            double sum = 0;
+            int terms = 0;
+            const auto add = [&](float area) {
+                if (!(area > 0)) return;
+                sum += std::log(static_cast<double>(area));
+                ++terms;
+            };
+            add(areas[v]);
+            for (std::uint64_t e = n.begin[v]; e < n.begin[v + 1]; ++e) add(areas[n.neighbours[e]]);
+            next[v] = terms ? static_cast<float>(std::exp(sum / terms)) : 0;
         });
         areas.swap(next);
     }

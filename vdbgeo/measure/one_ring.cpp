@@ -168,7 +168,8 @@ void check_curvature_input(const TriMesh& mesh, const char* stage) {
         return;
     const EdgeSums sums = sum_edges(mesh, 1);
     const double edge = sums.length / corners;
-    if (sums.spacing() > coarsest_rounding * edge)
+    // Points that all coincide have no shape either, but not for their coordinates.
+    if (edge > 0 && sums.spacing() > coarsest_rounding * edge)
         throw InvalidInput(fmt::format(
             "{}: coordinates up to {:.6g} Å are rounded to {:.2g} Å, and edges are {:.3g} Å long on average: "
             "too coarse for curvature; move the mesh to the origin before it is written",

@@ -260,6 +260,15 @@ Array<Vec3f> BallCentres::touching() const {
     return places;
 }
 
+/// The diagonal of the box around all points, Å.
+double extent(const TriMesh& mesh) {
+    Eigen::AlignedBox3d box;
+    for (const Vec3f& p : mesh.points) box.extend(p.cast<double>());
+    return box.isEmpty() ? 0 : box.diagonal().norm();
+}
+
+constexpr double largest_ball = 1e4;  // extents
+
 }  // namespace
 
 std::vector<double> hull_depths(const TriMesh& mesh, const std::vector<VertexId>& vertices,
@@ -302,6 +311,13 @@ std::vector<double> ambient_depths(const TriMesh& mesh, const std::vector<Vertex
         throw InvalidInput(fmt::format("pockets: a ball of radius {} Å cannot roll", radius));
     std::vector<double> depths(vertices.size(), 0);
     if (vertices.empty()) return depths;
+    // Places of the ball are 32-bit floats; and so large a ball rolls on the hull.
+    const double size = extent(mesh);
+    if (radius > largest_ball * size)
+        throw InvalidInput(fmt::format(
+            "pockets: a ball of radius {:.6g} Å is too large for a mesh of {:.6g} Å; give none for "
+            "the depth below the convex hull",
+            radius, size));
     const TriangleTree tree(mesh);
     BallCentres centres(mesh, tree, radius);
     centres.find(progress.part(0, 0.7));

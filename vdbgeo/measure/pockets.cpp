@@ -52,7 +52,8 @@ struct Search {
 
 double Search::protrusion_bound(double median) const {
     const double rare = area_histogram(curvature.k1, areas, 1).p95;
-    return std::max(least_protrusion_share * median, std::min(protrusion_share * median, rare));
+    const double bound = std::isfinite(rare) ? std::min(protrusion_share * median, rare) : 0;
+    return std::max(least_protrusion_share * median, bound);
 }
 
 void Search::choose_bounds(Pockets& found) {
@@ -62,7 +63,12 @@ void Search::choose_bounds(Pockets& found) {
         value[v] = pocket ? curvature.k2[v] : -curvature.k1[v];
         bend[v] = curvedness(curvature.k1[v], curvature.k2[v]);
     });
-    const double median = area_histogram(bend, areas, 1).median;
+    double median = area_histogram(bend, areas, 1).median;
+    if (median == 0) {  // mostly flat: of what bends
+        for (double& b : bend) b = b > 0 ? b : std::numeric_limits<double>::quiet_NaN();
+        median = area_histogram(bend, areas, 1).median;
+    }
+    if (!std::isfinite(median)) median = 0;
     found.threshold = pocket ? options.k2_below.value_or(-pocket_share * median)
                              : options.k1_above.value_or(protrusion_bound(median));
     level = pocket ? found.threshold : -found.threshold;

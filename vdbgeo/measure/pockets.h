@@ -81,7 +81,7 @@ struct Pockets {
 ///
 /// Vertices with flags (border, cap, undefined) and values that are not finite are in no patch. Any mesh will
 /// do for which there is curvature; no patch is an empty list, and where the surface has no curvature at all
-/// (median curvedness 0) there is none.
+/// there is none; where most of it is flat, c is the median over the rest.
 ///
 /// Throws InvalidInput for bad options, a mesh that check() refuses, curvature of another size, and without
 /// CGAL where no ambient radius is given and there is a patch; Cancelled. Deterministic. Cost: O(n log n);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "vdbgeo/core/errors.h"
@@ -108,7 +109,10 @@ AreaHistogram area_histogram(const Array<double>& values, const Array<double>& a
     AreaHistogram h;
     h.area.assign(bins, 0.0);
     const Array<Weighted> all = sorted(areas, [&](std::size_t v) { return values[v]; });
-    if (all.empty()) return h;
+    if (all.empty()) {
+        h.mean = h.rms = h.median = h.p05 = h.p95 = std::numeric_limits<double>::quiet_NaN();
+        return h;
+    }
     const double total = total_area(all);
     h.low = percentile(all, total, 0.005);
     h.high = percentile(all, total, 0.995);

@@ -58,9 +58,9 @@ struct AreaHistogram {
            p95 = 0;  ///< percentile p: the least value at or below which p % of the area is
 };
 
-/// Vertices with a value that is not finite, or with no area, are left out; all is 0 where none is left. The
-/// same for any number of threads. Throws InvalidInput where the sizes differ, an area is negative or no
-/// number, or for 0 bins. Cost: O(n log n), 16 bytes a vertex.
+/// Vertices with a value that is not finite, or with no area, are left out; where none is left the bins are
+/// empty and the numbers NaN. The same for any number of threads. Throws InvalidInput where the sizes differ,
+/// an area is negative or no number, or for 0 bins. Cost: O(n log n), 16 bytes a vertex.
 AreaHistogram area_histogram(const Array<double>& values, const Array<double>& areas, std::size_t bins);
 
 }  // namespace vdbgeo

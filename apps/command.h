@@ -35,6 +35,8 @@ Command repair_command();
 Command measure_command();
 Command curvature_command();
 Command pockets_command();
+Command tetrahedralize_command();
+Command cutaway_command();
 Command validate_command();
 Command render_command();
 Command model_command();

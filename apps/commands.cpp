@@ -64,11 +64,12 @@ int guarded(Session& session, const std::function<void(Session&)>& body) {
 }  // namespace
 
 std::vector<Command> all_commands() {
-    return {info_command(),     convert_command(),    phantom_command(),   denoise_command(),
-            edges_command(),    transform_command(),  flow_command(),      surface_command(),
-            remesh_command(),   simplify_command(),   smooth_command(),    repair_command(),
-            measure_command(),  components_command(), curvature_command(), pockets_command(),
-            validate_command(), render_command(),     model_command()};
+    return {info_command(),           convert_command(),    phantom_command(),   denoise_command(),
+            edges_command(),          transform_command(),  flow_command(),      surface_command(),
+            remesh_command(),         simplify_command(),   smooth_command(),    repair_command(),
+            measure_command(),        components_command(), curvature_command(), pockets_command(),
+            tetrahedralize_command(), cutaway_command(),    validate_command(),  render_command(),
+            model_command()};
 }
 
 int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program,

@@ -9,8 +9,8 @@
 
 #include "tests/support/meshes.h"
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/core/face_adjacency.h"
+#include "vdbgeo/measure/mesh_measures.h"
 
 namespace vdbgeo {
 namespace {

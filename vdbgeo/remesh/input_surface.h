@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/core/face_adjacency.h"
+#include "vdbgeo/core/tri_mesh.h"
 
 namespace vdbgeo {
 

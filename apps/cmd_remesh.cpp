@@ -4,6 +4,7 @@
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/mesh_command.h"
+#include "vdbgeo/measure/one_ring.h"
 #include "vdbgeo/measure/requirements.h"
 #include "vdbgeo/remesh/delaunay_remesh.h"
 #include "vdbgeo/remesh/isotropic_remesh.h"
@@ -20,14 +21,6 @@ struct RemeshOptions {
     DelaunayRemeshOptions delaunay;
     bool adaptive = false;
 };
-
-double mean_edge(const TriMesh& mesh) {
-    double sum = 0;
-    for (const Triangle& t : mesh.triangles)
-        for (std::size_t k = 0; k < 3; ++k)
-            sum += (mesh.points[t[k]] - mesh.points[t[(k + 1) % 3]]).cast<double>().norm();
-    return mesh.empty() ? 0 : sum / (3 * static_cast<double>(mesh.triangles.size()));
-}
 
 TriMesh by_delaunay(const RemeshOptions& o, const MeshWork& work) {
     require(work.before, {true, true, true, true}, "remesh --method delaunay");

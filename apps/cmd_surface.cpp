@@ -1,13 +1,13 @@
 // vdbgeo surface: the surface of a map at an isovalue, or the surfaces of a segmentation.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <filesystem>
 
 #include "apps/command.h"
 #include "apps/flags.h"
 #include "apps/mesh_command.h"
 #include "apps/reports.h"
+#include "apps/label_stages.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
 #include "vdbgeo/surface/label_surfaces.h"
@@ -25,23 +25,6 @@ struct SurfaceOptions {
     LabelSurfacesOptions label_options;
     std::vector<std::int64_t> wanted;  ///< labels, none for all
 };
-
-/// "all", or numbers with commas between them.
-std::vector<std::int64_t> parse_labels(const std::string& text) {
-    std::vector<std::int64_t> labels;
-    if (text == "all") return labels;
-    const char *at = text.data(), *end = text.data() + text.size();
-    for (bool more = true; more;) {
-        std::int64_t label = 0;
-        const auto [rest, error] = std::from_chars(at, end, label);
-        more = rest != end && *rest == ',';
-        if (error != std::errc() || (rest != end && !more))
-            throw UsageError(fmt::format("--labels: '{}' is neither all nor a list such as 1,2,5", text));
-        labels.push_back(label);
-        at = rest + 1;
-    }
-    return labels;
-}
 
 /// Drops pieces where asked; tells how many went.
 TriMesh keep_pieces(TriMesh mesh, const SurfaceOptions& o, Session& session) {
@@ -81,29 +64,8 @@ void finish(const TriMesh& mesh, const SurfaceOptions& o, const Json& head,
     session.result(j);
 }
 
-/// All surfaces in one mesh, with the face property `label`.
-TriMesh join_labels(const std::vector<LabelSurface>& surfaces, const std::string& name) {
-    TriMesh all;
-    MeshProperty label{"label", 1, {}};
-    for (const LabelSurface& s : surfaces) {
-        if (all.points.size() + s.mesh.points.size() > TriMesh::max_vertices)
-            throw InvalidInput(
-                fmt::format("{}: the labels' surfaces have more than 2^32-1 vertices together", name));
-        const auto first = static_cast<VertexId>(all.points.size());
-        all.points.insert(all.points.end(), s.mesh.points.begin(), s.mesh.points.end());
-        for (const Triangle& t : s.mesh.triangles)
-            all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-        label.values.resize(all.triangles.size(), static_cast<float>(s.label));
-    }
-    all.face_properties.push_back(std::move(label));
-    return all;
-}
-
 void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock& clock, Session& session) {
-    if (!is_label_map(in.map))
-        throw InvalidInput(fmt::format(
-            "{}: not a segmentation: its samples are not whole numbers, or there are too many different ones",
-            o.in));
+    need_labels(o.in, in.map);
     LabelSurfacesOptions options = o.label_options;
     options.labels = o.wanted;
     auto surfaces = naming(o.in, [&] { return label_surfaces(in.map, options, session.stage("surfaces")); });

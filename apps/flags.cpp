@@ -192,6 +192,18 @@ void refuse_flags(const CLI::App& app, const std::vector<std::string>& names, co
         if (app.get_option(name)->count() > 0) throw UsageError(fmt::format("{}: {}", name, why));
 }
 
+bool parse_length(const char* flag, const char* unit, const std::string& text, double& length) {
+    if (text.empty()) return false;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, length);
+    const std::string suffix(rest, static_cast<std::size_t>(end - rest));
+    if (error != std::errc() || !(length > 0) || !std::isfinite(length) ||
+        !(suffix.empty() || suffix == "A" || suffix == "Å"))
+        throw UsageError(
+            fmt::format("{}: '{}' is not a length: give {} (0.8) or Å (1.5A)", flag, text, unit));
+    return !suffix.empty();
+}
+
 void add_vdb_flags(CLI::App& app, VdbWriteOptions& options) {
     using Compression = VdbWriteOptions::Compression;
     static const std::map<std::string, Compression> names{

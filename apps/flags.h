@@ -37,6 +37,10 @@ struct IsoFlag {
 /// UsageError where one of these flags was given: `why` tells what it belongs to.
 void refuse_flags(const CLI::App& app, const std::vector<std::string>& names, const std::string& why);
 
+/// A length: "0.8" is in `unit` (voxels, say), "1.5A" in Å; tells whether it was in Å. An empty text leaves
+/// `length` as it is. UsageError for what is no length above 0.
+bool parse_length(const char* flag, const char* unit, const std::string& text, double& length);
+
 void add_vdb_flags(CLI::App& app, VdbWriteOptions& options);
 void add_render_flags(CLI::App& app, RenderOptions& options);
 

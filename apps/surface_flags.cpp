@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 #include <openvdb/tools/ValueTransformer.h>
 
-#include <charconv>
-#include <cmath>
-
 #include "apps/flags.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/cap.h"
@@ -13,18 +10,6 @@
 
 namespace vdbgeo::app {
 namespace {
-
-/// "0.8" is in voxels, "1.5A" in Å; tells which.
-bool parse_length(const char* flag, const std::string& text, double& length) {
-    if (text.empty()) return false;
-    const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, length);
-    const std::string unit(rest, static_cast<std::size_t>(end - rest));
-    if (error != std::errc() || !(length > 0) || !std::isfinite(length) ||
-        !(unit.empty() || unit == "A" || unit == "Å"))
-        throw UsageError(fmt::format("{}: '{}' is not a length: give voxels (0.8) or Å (1.5A)", flag, text));
-    return !unit.empty();
-}
 
 /// The voxels of a map or grid that are above 0.
 openvdb::BoolGrid::Ptr read_mask(const std::string& file, const Frame& frame) {
@@ -90,8 +75,8 @@ void SurfaceFlags::add(CLI::App& app) {
 }
 
 void SurfaceFlags::finish(const CLI::App& app) {
-    radius_in_A_ = parse_length("--radius", radius, delaunay.radius);
-    distance_in_A_ = parse_length("--distance", distance, delaunay.distance);
+    radius_in_A_ = parse_length("--radius", "voxels", radius, delaunay.radius);
+    distance_in_A_ = parse_length("--distance", "voxels", distance, delaunay.distance);
     check_usage(delaunay);
     check_usage(dual);
     if (method == "delaunay" && !have_delaunay())
@@ -104,21 +89,24 @@ void SurfaceFlags::finish(const CLI::App& app) {
                      "belongs to --method delaunay");
 }
 
-/// A level set turned into a density: what is inside is above the isovalue.
-DensityMap SurfaceFlags::oriented(const MapFile& in) const {
-    if (!in.level_set) return in.map;
-    DensityMap map = in.map;
-    map.grid = openvdb::FloatGrid::create(*in.map.grid);
-    map.grid->setTree(std::make_shared<openvdb::FloatTree>(in.map.grid->tree()));
+DensityMap turned_over(const DensityMap& level_set) {
+    DensityMap map = level_set;
+    map.grid = openvdb::FloatGrid::create(*level_set.grid);
+    map.grid->setTree(std::make_shared<openvdb::FloatTree>(level_set.grid->tree()));
     openvdb::tools::foreach (map.grid->beginValueAll(),
                              [](const openvdb::FloatGrid::ValueAllIter& it) { it.setValue(-*it); });
     map.grid->tree().root().setBackground(-map.grid->background(), false);
+    map.grid->setGridClass(openvdb::GRID_UNKNOWN);
+    std::swap(map.statistics.min, map.statistics.max);
+    map.statistics.min *= -1;
+    map.statistics.max *= -1;
+    map.statistics.mean *= -1;
     return map;
 }
 
 TriMesh SurfaceFlags::extract(const MapFile& in, double isovalue, const Progress& progress) const {
     const double level = in.level_set ? -isovalue : isovalue;
-    const DensityMap map = oriented(in);
+    const DensityMap map = in.level_set ? turned_over(in.map) : in.map;
     const double voxel = map.frame.voxel_size().minCoeff();
     if (method == "dual") {
         DualSurfaceOptions options = dual;

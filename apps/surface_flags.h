@@ -20,6 +20,9 @@ struct ComponentFlags {
     bool any() const;
 };
 
+/// A level set turned into a density: what is inside is above 0 (and above the negated isovalue).
+DensityMap turned_over(const DensityMap& level_set);
+
 struct SurfaceFlags {
     std::string method = "marching-cubes";
     DelaunaySurfaceOptions delaunay;
@@ -35,7 +38,6 @@ struct SurfaceFlags {
     TriMesh extract(const MapFile& in, double isovalue, const Progress& progress) const;
 
  private:
-    DensityMap oriented(const MapFile& in) const;
     bool radius_in_A_ = false, distance_in_A_ = false;
 };
 

@@ -10,6 +10,8 @@
 #include <sstream>
 
 #include "tests/support/maps.h"
+#include "tests/support/meshes.h"
+#include "tests/support/small_meshes.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/marching_cubes.h"
 #include "vdbgeo/volume/phantom.h"
@@ -264,6 +266,39 @@ TEST(LevelSet, StopsWhenAskedTo) {
                                              [](const Vec3d& p) { return 12 - p.norm(); });
     for (const double stop : {0.1, 0.5, 0.8})
         EXPECT_THROW(level_set(map, 0, {}, Progress([&](double done) { return done < stop; })), Cancelled);
+}
+
+TEST(MeshLevelSet, ABoxOfLargeTrianglesIsItsDistance) {
+    // Faces of 400 voxels² each, not aligned with the voxels; the distance to a box is known.
+    const Vec3f corner(0.3f, -7.1f, 2.2f);
+    const float edge = 9.4f;
+    const auto grid = mesh_level_set(test::cube(corner, edge), 0.45, {4.0});
+    const auto truth = [&](const Vec3d& p) {
+        const Vec3d d = (p - (corner.cast<double>() + Vec3d::Constant(edge / 2.0))).cwiseAbs() -
+                        Vec3d::Constant(edge / 2.0);
+        return d.cwiseMax(0).norm() + std::min(d.maxCoeff(), 0.0);
+    };
+    EXPECT_GT(grid->activeVoxelCount(), 10000u);
+    EXPECT_LT(distance_error(*grid, truth), 1e-5);
+    EXPECT_EQ(at_world(*grid, corner.cast<double>() + Vec3d::Constant(edge / 2.0)), -grid->background());
+    EXPECT_EQ(grid->getGridClass(), openvdb::GRID_LEVEL_SET);
+}
+
+TEST(MeshLevelSet, CavitiesAreOutside) {
+    const TriMesh shell = test::joined(test::icosphere(3, 10), test::flipped(test::icosphere(3, 5)));
+    const auto grid = mesh_level_set(shell, 0.5);
+    EXPECT_GT(at_world(*grid, Vec3d::Zero()), 0);
+    EXPECT_LT(at_world(*grid, Vec3d(7.5, 0, 0)), 0);
+    EXPECT_GT(at_world(*grid, Vec3d(0, 11, 0)), 0);
+    const auto truth = [](const Vec3d& p) { return std::max(p.norm() - 10, 5 - p.norm()); };
+    EXPECT_LT(distance_error(*grid, truth), 0.1);  // of the faces' chords
+}
+
+TEST(MeshLevelSet, BadInputIsRefused) {
+    EXPECT_THROW(mesh_level_set({}, 1), InvalidInput);
+    EXPECT_THROW(mesh_level_set(test::cube(), 0), InvalidInput);
+    EXPECT_THROW(mesh_level_set(test::cube(), 1e-12), InvalidInput);
+    EXPECT_THROW(mesh_level_set(test::cube(), std::nan("")), InvalidInput);
 }
 
 }  // namespace

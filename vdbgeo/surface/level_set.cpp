@@ -19,8 +19,8 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/surface/marching_cubes.h"
+#include "vdbgeo/surface/mesh_solid.h"
 #include "vdbgeo/volume/derived_grid.h"
 
 namespace vdbgeo {
@@ -173,7 +173,7 @@ class Side {
           same_(target.same),
           to_map_(target.from_map.inverse()) {}
 
-    bool is_dense(const Coord& ijk) const {
+    bool operator()(const Coord& ijk) const {
         if (same_) return samples_.getValue(ijk) >= level_;
         const Vec3d p = to_map_ * Vec3d(ijk.x(), ijk.y(), ijk.z());
         return openvdb::tools::BoxSampler::sample(samples_, openvdb::Vec3d(p.x(), p.y(), p.z())) >= level_;
@@ -189,8 +189,10 @@ class Side {
 /// The band of voxels nearer than `half` voxels to a triangle, with signed distances; all else is ±width.
 /// Each voxel looks through the cells around it, the nearest first, until no cell can hold a nearer triangle:
 /// exact, and about a hundred cells of which few are not empty.
-FloatTree::Ptr signed_band(const TriangleCells& triangles, const Field& field, const Target& target,
-                           double half, float width, const Progress& progress) {
+/// `side_of()` gives each task a function of its own from voxel to whether it is dense.
+template <class SideOf>
+FloatTree::Ptr signed_band(const TriangleCells& triangles, const SideOf& side_of, double half, float width,
+                           const Progress& progress) {
     openvdb::MaskTree near(triangles.heads(), false, true, openvdb::TopologyCopy());
     openvdb::tools::dilateActiveValues(near, static_cast<int>(std::ceil(half + triangles.reach())) + 1,
                                        openvdb::tools::NN_FACE_EDGE_VERTEX);
@@ -202,7 +204,7 @@ FloatTree::Ptr signed_band(const TriangleCells& triangles, const Field& field, c
     openvdb::tree::LeafManager<FloatTree> leaves(*tree);
     std::atomic<std::size_t> done{0};
     parallel_for(leaves.leafCount(), 8, [&](std::size_t n) {
-        const Side side(field, target);
+        const auto is_dense = side_of();
         openvdb::tree::ValueAccessor<const openvdb::Int64Tree> heads(triangles.heads());
         for (auto it = leaves.leaf(n).beginValueOn(); it; ++it) {
             const Coord ijk = it.getCoord();
@@ -215,7 +217,7 @@ FloatTree::Ptr signed_band(const TriangleCells& triangles, const Field& field, c
             }
             const bool in_band = best < half * half;
             const float distance = std::min(width, static_cast<float>(std::sqrt(best) * voxel));
-            it.setValue(side.is_dense(ijk) ? -distance : distance);
+            it.setValue(is_dense(ijk) ? -distance : distance);
             if (!in_band || distance >= width) it.setValueOff();
         }
         const std::size_t now = ++done;
@@ -223,6 +225,39 @@ FloatTree::Ptr signed_band(const TriangleCells& triangles, const Field& field, c
             progress.report(static_cast<double>(now) / static_cast<double>(leaves.leafCount()));
     });
     return tree;
+}
+
+/// The band with all else filled in by its side.
+FloatGrid::Ptr level_set_grid(const FloatTree::Ptr& band) {
+    openvdb::tools::pruneInactive(*band);  // the flood goes from active voxel to active voxel
+    openvdb::tools::signedFloodFill(*band);
+    openvdb::tools::pruneLevelSet(*band);
+    const auto grid = FloatGrid::create(band);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    return grid;
+}
+
+/// The same surface in triangles of edges up to `longest`, cut into n² similar parts each: one large triangle
+/// would make every voxel look far around.
+TriMesh in_small_parts(const TriMesh& mesh, double longest) {
+    TriMesh parts;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3d a = mesh.points[t[0]].cast<double>(), b = mesh.points[t[1]].cast<double>(),
+                    c = mesh.points[t[2]].cast<double>();
+        const double edge = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+        const int n = std::max(1, static_cast<int>(std::ceil(edge / longest)));
+        const auto first = static_cast<VertexId>(parts.points.size());
+        const auto at = [&](int i, int j) { return first + static_cast<VertexId>(i * (i + 1) / 2 + j); };
+        for (int i = 0; i <= n; ++i)  // row i has i + 1 points, from the side of b to that of c
+            for (int j = 0; j <= i; ++j)
+                parts.points.push_back((a + (b - a) * (i - j) / n + (c - a) * j / n).cast<float>());
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j <= i; ++j) {
+                parts.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+                if (j < i) parts.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+            }
+    }
+    return parts;
 }
 
 /// half · voxel as a float that is not below it: OpenVDB's check of level sets divides again.
@@ -257,19 +292,48 @@ FloatGrid::Ptr level_set(const DensityMap& map, double isovalue, const LevelSetO
 
     const auto transform = transform_of(target.frame);
     const float width = band_width(options.half_width, transform->voxelSize()[0]);
-    const auto tree = signed_band(TriangleCells(mesh, target), field, target, options.half_width, width,
-                                  progress.part(0.4, 0.95));
-    openvdb::tools::pruneInactive(*tree);  // the flood goes from active voxel to active voxel
-    openvdb::tools::signedFloodFill(*tree);
-    openvdb::tools::pruneLevelSet(*tree);
-    const auto grid = FloatGrid::create(tree);
+    const auto grid = level_set_grid(signed_band(
+        TriangleCells(mesh, target), [&] { return Side(field, target); }, options.half_width, width,
+        progress.part(0.4, 0.95)));
     progress.report(1);
 
     const std::string line =
         fmt::format("level set at {} half width {} voxels", isovalue, options.half_width);
     derive_from(*map.grid, target.frame, *grid, "surface", line);
-    grid->setGridClass(openvdb::GRID_LEVEL_SET);
     set_metadata(*grid, "vdbgeo_isovalue", isovalue);
+    return grid;
+}
+
+FloatGrid::Ptr mesh_level_set(const TriMesh& mesh, double voxel_A, const LevelSetOptions& options,
+                              const Progress& progress) {
+    options.check();
+    check(mesh, "level set");
+    if (mesh.empty()) throw InvalidInput("a level set needs a mesh that has faces");
+    if (!(voxel_A > 0) || !std::isfinite(voxel_A))
+        throw InvalidInput(fmt::format("a voxel of {} Å is not a length above 0", voxel_A));
+    std::vector<Vec3d> points(mesh.points.size());
+    double far = 0;
+    for (std::size_t v = 0; v < points.size(); ++v) {
+        points[v] = mesh.points[v].cast<double>();
+        far = std::max(far, points[v].cwiseAbs().maxCoeff());
+    }
+    if (far / voxel_A > (1 << 29))
+        throw InvalidInput(fmt::format("a voxel of {} Å is too small for a mesh that reaches {} Å", voxel_A, far));
+    Target target;
+    target.same = false;
+    target.frame.axes = voxel_A * Mat3d::Identity();
+    target.from_map.linear() = Mat3d::Identity() / voxel_A;
+    const MeshSolid solid(std::move(points), mesh.triangles);
+    const auto side_of = [&] {
+        return [&](const Coord& ijk) { return solid(voxel_A * Vec3d(ijk.x(), ijk.y(), ijk.z())) > 0; };
+    };
+    const float width = band_width(options.half_width, voxel_A);
+    const TriMesh parts = in_small_parts(mesh, 2 * voxel_A);
+    const auto grid = level_set_grid(
+        signed_band(TriangleCells(parts, target), side_of, options.half_width, width, progress.part(0.1, 0.95)));
+    grid->setTransform(transform_of(target.frame));
+    grid->setName("surface");
+    progress.report(1);
     return grid;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/session.h"
@@ -9,12 +10,13 @@
 
 namespace vdbgeo::app {
 
-/// vertices, tets, volume_A3, min_dihedral_deg, max_dihedral_deg, radius_edge_max, radius_edge_mean, slivers, and
-/// more.
+/// vertices, tets, volume_A3, min_dihedral_deg, max_dihedral_deg, radius_edge_max, radius_edge_mean, slivers,
+/// inverted, boundary_faces, mean_min_dihedral_deg, min_dihedral_p01_deg, min_tet_volume_A3,
+/// max_tet_volume_A3, mean_edge_A, min_edge_A, max_edge_A; regions[]: region, tets, volume_A3.
 Json tets_json(const TetQuality& quality);
 std::vector<std::string> tets_text(const TetQuality& quality);
 
-/// Histograms of the dihedral angles of one or several meshes as curves, as a picture (.png or .svg).
+/// Histogram of the dihedral angles as a picture (.png); of several meshes as curves.
 void write_dihedral_histogram(const std::vector<std::pair<std::string, TetQuality>>& meshes,
                               const std::string& path);
 

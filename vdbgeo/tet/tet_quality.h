@@ -10,15 +10,20 @@
 
 namespace vdbgeo {
 
-/// The numbers of one tetrahedron. A flat or turned-over one has volume ≤ 0, and angles as its faces lie.
+/// The numbers of one tetrahedron. A flat or turned-over one has volume ≤ 0, and angles in 0…180° as its
+/// faces lie: a turned-over one those of its mirror image, a flat one 0° and 180°; beside a face without area
+/// 0°.
 struct TetShape {
-    double volume = 0;                              ///< signed, Å³
-    std::array<double, 6> dihedral_deg{};           ///< at the edges of tet_edges
+    double volume = 0;                     ///< signed, Å³
+    std::array<double, 6> dihedral_deg{};  ///< at the edges of tet_edges
     double min_dihedral_deg = 0, max_dihedral_deg = 0;
     /// Circumradius over shortest edge: √6/4 = 0.612 for the regular one, ∞ for a flat one.
     double radius_edge = 0;
 };
 
+/// The dihedral angle at the edge e between faces with normals m, n of twice their area: atan2(6 V |e|,
+/// −m·n), as |m × n| = 6 V |e|, which is exact for slivers too. The circumradius is |Σ |u|² v × w| / 12 V
+/// over the three edges from one corner (J. R. Shewchuk, "What is a good linear finite element?", 2002, §6).
 TetShape tet_shape(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d);
 
 /// One region of a mesh.
@@ -32,17 +37,19 @@ struct TetQuality {
     static constexpr int radius_edge_bins = 100;  ///< of 0.05, the last one open
     static constexpr double sliver_deg = 5;
 
-    std::uint64_t vertices = 0, tets = 0;
-    std::uint64_t boundary_faces = 0;
-    std::uint64_t inverted = 0;  ///< of no or negative volume
-    std::uint64_t slivers = 0;   ///< with a dihedral angle below 5° or above 175°
+    std::uint64_t vertices = 0, tets = 0;  ///< vertices that no tetrahedron uses included
+    std::uint64_t boundary_faces = 0;      ///< of the mesh's `faces`, those before which is nothing
+    std::uint64_t inverted = 0;            ///< of no or negative volume
+    std::uint64_t slivers = 0;             ///< with a dihedral angle below 5° or above 175°
     double volume_A3 = 0;
     double min_volume_A3 = 0, max_volume_A3 = 0;  ///< of a tetrahedron
     double min_dihedral_deg = 0, max_dihedral_deg = 0, mean_min_dihedral_deg = 0;
     double min_dihedral_p01_deg = 0;  ///< of the tetrahedra's smallest angles, 1 % are below
+    /// Of those that have one: flat tetrahedra (volume 0) are in the histogram's last bin only.
     double radius_edge_max = 0, radius_edge_mean = 0;
+    /// The mean over the six edges of each tetrahedron: an edge counts once for each tetrahedron around it.
     double mean_edge_A = 0, min_edge_A = 0, max_edge_A = 0;
-    std::vector<TetRegion> regions;                   ///< by number
+    std::vector<TetRegion> regions;                       ///< by number
     std::array<std::uint64_t, 180> dihedral_histogram{};  ///< all six angles of each, by whole degrees
     std::array<std::uint64_t, radius_edge_bins> radius_edge_histogram{};
 };

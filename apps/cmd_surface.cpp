@@ -5,9 +5,9 @@
 
 #include "apps/command.h"
 #include "apps/flags.h"
+#include "apps/label_stages.h"
 #include "apps/mesh_command.h"
 #include "apps/reports.h"
-#include "apps/label_stages.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
 #include "vdbgeo/surface/label_surfaces.h"

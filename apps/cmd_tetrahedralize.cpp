@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/command.h"
@@ -15,6 +16,7 @@
 #include "apps/tet_stages.h"
 #include "converters/mesh_file.h"
 #include "converters/tet_file.h"
+#include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/measure/surface_distance.h"
 
 namespace vdbgeo::app {
@@ -31,8 +33,7 @@ struct TetrahedralizeOptions {
 };
 
 TetInput read_input(const TetrahedralizeOptions& o, Json& j, Session& session) {
-    if (is_mesh_input(o.in))
-        return tet_input(o.in, read_mesh(o.in, session.stage("reading")), o.filter);
+    if (is_mesh_input(o.in)) return tet_input(o.in, read_mesh(o.in, session.stage("reading")), o.filter);
     const Isovalue rule = o.iso.parse();
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
@@ -44,8 +45,8 @@ TetInput read_input(const TetrahedralizeOptions& o, Json& j, Session& session) {
 }
 
 /// What the boundary is against the surface that was to be filled.
-void compare_with_surface(const TetInput& input, const TetMesh& mesh, double volume_A3, bool distance, Json& j,
-                          std::vector<std::string>& lines, Session& session) {
+void compare_with_surface(const TetInput& input, const TetMesh& mesh, double volume_A3, bool distance,
+                          Json& j, std::vector<std::string>& lines, Session& session) {
     const MeshMeasures surface = measure_mesh(input.surface);
     j["surface_volume_A3"] = surface.volume_A3 ? Json(*surface.volume_A3) : Json();
     if (surface.volume_A3) {
@@ -101,8 +102,9 @@ void run_tetrahedralize(const TetrahedralizeOptions& o, Session& session) {
                          {"flips", r.flips},
                          {"outside_before", r.outside_before},
                          {"outside_after", r.outside_after}};
-        lines.push_back(fmt::format("optimized   {} moves, {} flips in {} rounds; out of the bounds {}, then {}",
-                                    r.moves, r.flips, r.rounds, r.outside_before, r.outside_after));
+        lines.push_back(
+            fmt::format("optimized   {} moves, {} flips in {} rounds; out of the bounds {}, then {}", r.moves,
+                        r.flips, r.rounds, r.outside_before, r.outside_after));
     }
     compare_with_surface(input, made.mesh, quality.volume_A3, !o.no_distance, j, lines, session);
     seconds["measure"] = clock.lap();
@@ -115,7 +117,8 @@ void run_tetrahedralize(const TetrahedralizeOptions& o, Session& session) {
     if (!session.json)
         for (const std::string& line : lines) session.say(line);
     if (quality.inverted > 0)
-        session.warn(fmt::format("{}: {} tetrahedra have no volume, or are turned over", o.out, quality.inverted));
+        session.warn(
+            fmt::format("{}: {} tetrahedra have no volume, or are turned over", o.out, quality.inverted));
     session.result(j);
 }
 
@@ -136,11 +139,12 @@ void run_compare(const TetrahedralizeOptions& o, const CLI::App& flags, Session&
     for (const std::string& method : tet_methods()) {
         if (source_of(o) == TetSource::labels && method == "stuffing") continue;
         const double done = static_cast<double>(runs.size()) / static_cast<double>(tet_methods().size());
-        progress.report(0.9 * done);
         runs.push_back(run_method(o.in, method, (folder / (method + ".vtu")).string(),
-                                  o.tets.words_of(flags, method), session));
+                                  o.tets.words_of(flags, method), session,
+                                  progress.part(0.9 * done, 0.9 * done + 0.2)));
     }
-    const bool any = std::any_of(runs.begin(), runs.end(), [](const MethodRun& r) { return r.error.empty(); });
+    const bool any =
+        std::any_of(runs.begin(), runs.end(), [](const MethodRun& r) { return r.error.empty(); });
     if (!any) {
         if (made) std::filesystem::remove(folder, error);
         throw NumericalError(fmt::format("{}: no method succeeded: {}", o.in, runs.front().error));
@@ -168,7 +172,7 @@ void run_compare(const TetrahedralizeOptions& o, const CLI::App& flags, Session&
 
 void check_flags(TetrahedralizeOptions& o, const CLI::App& flags) {
     o.map.finish();
-    o.tets.finish(flags, o.compare);
+    o.tets.finish(flags);
     check_usage(o.filter);
     if (o.compare) {
         refuse_flags(flags, {"--method"}, "--compare runs all methods");
@@ -181,7 +185,7 @@ void check_flags(TetrahedralizeOptions& o, const CLI::App& flags) {
         refuse_flags(flags, {"--iso", "--keep-largest", "--min-volume"}, "means nothing with --labels");
     }
     if (is_mesh_input(o.in)) refuse_flags(flags, {"--iso", "--labels"}, "belongs to a map, not to a mesh");
-    if (!o.compare) o.tets.method_for(source_of(o));
+    if (!o.compare) o.tets.refuse_others(flags, o.tets.method_for(source_of(o)));
 }
 
 }  // namespace
@@ -194,16 +198,18 @@ Command tetrahedralize_command() {
             "  vdbgeo tetrahedralize emd_1080.map groel-methods --iso 0.8 --compare",
             [](CLI::App& app) {
                 auto o = std::make_shared<TetrahedralizeOptions>();
-                app.add_option("in", o->in, "Map (MRC, CCP4), VDB grid, or closed mesh: " + mesh_endings_text())
+                app.add_option("in", o->in,
+                               "Map (MRC, CCP4), VDB grid, or closed mesh: " + mesh_endings_text())
                     ->required();
                 app.add_option("out", o->out,
                                "Tetrahedra to write: " + tet_endings_text() +
                                    "; with --compare a folder for a table, a picture and the meshes")
                     ->required();
                 o->iso.add(app);
-                app.add_option("--labels", o->labels,
-                               "The map is a segmentation: fill all its labels, or a list such as 1,2,5, a region "
-                               "each");
+                app.add_option(
+                    "--labels", o->labels,
+                    "The map is a segmentation: fill all its labels, or a list such as 1,2,5, a region "
+                    "each");
                 app.add_flag("--compare", o->compare, "Run all methods: a table and a picture of cutaways");
                 o->tets.add(app);
                 app.add_option("--keep-largest", o->filter.keep_largest,

@@ -17,10 +17,10 @@ struct MethodRun {
     Json result;
 };
 
-/// Runs this program once for each method, each in a process of its own (so that times and peak memory are its
-/// own, and a method that fails spoils no other), with `words` behind the method's own flags.
+/// Runs this program once for each method, each in a process of its own (so that times and peak memory are
+/// its own, and a method that fails spoils no other), with `words` behind the method's own flags.
 MethodRun run_method(const std::string& in, const std::string& method, const std::string& file,
-                     const std::vector<std::string>& words, Session& session);
+                     const std::vector<std::string>& words, const Session& session, const Progress& progress);
 
 /// The table as CSV: one line a method, units in the names of the columns.
 std::string comparison_csv(const std::vector<MethodRun>& runs);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 
 #include "apps/flags.h"
 
@@ -17,18 +19,27 @@ struct Owned {
 
 const std::vector<Owned>& owned_flags() {
     static const std::vector<std::string> bounded{"cgal", "tetgen", "netgen"};
-    static const std::vector<Owned> table{
-        {"--cell", {"stuffing"}},          {"--coarsening", {"stuffing"}},
-        {"--angle", bounded},              {"--radius", bounded},
-        {"--distance", bounded},           {"--radius-edge", {"cgal", "tetgen"}},
-        {"--cell-size", {"cgal"}},         {"--lloyd", {"cgal"}},
-        {"--odt", {"cgal"}},               {"--perturb", {"cgal"}},
-        {"--exude", {"cgal"}},             {"--sliver-bound", {"cgal"}},
-        {"--parallel", {"cgal"}},          {"--size-by", {"cgal", "tetgen"}},
-        {"--size-range", {"cgal", "tetgen"}}, {"--min-dihedral", {"tetgen"}},
-        {"--max-volume", {"tetgen"}},      {"--split-surface", {"tetgen"}},
-        {"--max-edge", {"netgen"}},        {"--grading", {"netgen"}},
-        {"--rounds", {"netgen"}}};
+    static const std::vector<Owned> table{{"--cell", {"stuffing"}},
+                                          {"--coarsening", {"stuffing"}},
+                                          {"--angle", bounded},
+                                          {"--radius", bounded},
+                                          {"--distance", bounded},
+                                          {"--radius-edge", {"cgal", "tetgen"}},
+                                          {"--cell-size", {"cgal"}},
+                                          {"--lloyd", {"cgal"}},
+                                          {"--odt", {"cgal"}},
+                                          {"--perturb", {"cgal"}},
+                                          {"--exude", {"cgal"}},
+                                          {"--sliver-bound", {"cgal"}},
+                                          {"--parallel", {"cgal"}},
+                                          {"--size-by", {"cgal", "tetgen"}},
+                                          {"--size-range", {"cgal", "tetgen"}},
+                                          {"--min-dihedral", {"tetgen"}},
+                                          {"--max-volume", {"tetgen"}},
+                                          {"--split-surface", {"tetgen"}},
+                                          {"--max-edge", {"netgen"}},
+                                          {"--grading", {"netgen"}},
+                                          {"--rounds", {"netgen"}}};
     return table;
 }
 
@@ -62,15 +73,17 @@ void TetFlags::add(CLI::App& app) {
     const auto length = [&app](const char* flag, LengthFlag& to, const std::string& text) {
         app.add_option(flag, to.text, text)->type_name("LENGTH");
     };
-    app.add_option("--method", method,
-                   "stuffing (isosurface stuffing: fast, proven angles), cgal (Delaunay refinement, straight "
-                   "from the map too), tetgen or netgen (fill a surface, whose triangles they keep) [stuffing "
-                   "for a map, cgal for --labels, tetgen for a mesh]")
+    app.add_option(
+           "--method", method,
+           "stuffing (isosurface stuffing: fast, proven angles), cgal (Delaunay refinement, straight "
+           "from the map too), tetgen or netgen (fill a surface, whose triangles they keep) [stuffing "
+           "for a map, cgal for --labels, tetgen for a mesh]")
         ->check(CLI::IsMember(tet_methods()).description(""));
-    length("--cell", cell_,
-           fmt::format("stuffing: side of the cubes at the surface, in voxels (of a mesh: mean edges), or in Å "
-                       "as 3A [{}; 1 of a mesh]",
-                       stuffing_.cell));
+    length(
+        "--cell", cell_,
+        fmt::format("stuffing: side of the cubes at the surface, in voxels (of a mesh: mean edges), or in Å "
+                    "as 3A [{}; 1 of a mesh]",
+                    stuffing_.cell));
     app.add_option("--coarsening", stuffing_.coarsening,
                    "stuffing: how many times cubes may double their side inside")
         ->capture_default_str();
@@ -78,10 +91,11 @@ void TetFlags::add(CLI::App& app) {
                    fmt::format("cgal; tetgen and netgen of a map: least angle of a boundary triangle, in "
                                "degrees [{}; {}]",
                                delaunay_.facet_angle_deg, surface_.angle_deg));
-    length("--radius", radius_,
-           fmt::format("cgal; tetgen and netgen of a map: largest radius of a boundary triangle's surface ball, "
-                       "in voxels (of a mesh: mean edges), or in Å as 3A [{}; {}]",
-                       delaunay_.facet_size, surface_.radius));
+    length(
+        "--radius", radius_,
+        fmt::format("cgal; tetgen and netgen of a map: largest radius of a boundary triangle's surface ball, "
+                    "in voxels (of a mesh: mean edges), or in Å as 3A [{}; {}]",
+                    delaunay_.facet_size, surface_.radius));
     length("--distance", distance_,
            fmt::format("cgal; tetgen and netgen of a map: largest distance of a boundary triangle from the "
                        "surface, in voxels (of a mesh: mean edges), or in Å as 1A [{}; {}]",
@@ -90,17 +104,19 @@ void TetFlags::add(CLI::App& app) {
                    fmt::format("cgal, tetgen: largest circumradius over shortest edge, 0.612 is the regular "
                                "tetrahedron's [{}; {}]",
                                delaunay_.cell_radius_edge, tetgen_.radius_edge));
-    length("--cell-size", cell_size_,
-           fmt::format("cgal: largest circumradius of a tetrahedron, in voxels (of a mesh: mean edges), or in Å "
-                       "as 3A [{}]",
-                       delaunay_.cell_size));
+    length(
+        "--cell-size", cell_size_,
+        fmt::format("cgal: largest circumradius of a tetrahedron, in voxels (of a mesh: mean edges), or in Å "
+                    "as 3A [{}]",
+                    delaunay_.cell_size));
     app.add_flag("--lloyd", delaunay_.lloyd, "cgal: smooth all (Lloyd)");
     app.add_flag("--odt", delaunay_.odt, "cgal: smooth all (optimal Delaunay triangulation)");
     app.add_flag("--perturb", delaunay_.perturb, "cgal: move vertices of slivers");
     app.add_flag("--exude", delaunay_.exude, "cgal: remove slivers by weights");
-    app.add_option("--sliver-bound", sliver_bound_,
-                   fmt::format("cgal: dihedral angle that --perturb and --exude try to reach, in degrees [{}]",
-                               delaunay_.sliver_bound_deg));
+    app.add_option(
+        "--sliver-bound", sliver_bound_,
+        fmt::format("cgal: dihedral angle that --perturb and --exude try to reach, in degrees [{}]",
+                    delaunay_.sliver_bound_deg));
     app.add_flag("--parallel", delaunay_.parallel, "cgal: all threads; another mesh in each run");
     app.add_option("--min-dihedral", min_dihedral_,
                    fmt::format("tetgen: smallest dihedral angle asked for, in degrees, 0 to 18 [{}]",
@@ -113,9 +129,10 @@ void TetFlags::add(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--rounds", netgen_.optimisation_rounds, "netgen: rounds of its optimisation")
         ->capture_default_str();
-    app.add_option("--size-by", size_by_,
-                   "cgal, tetgen: small tetrahedra where the surface is curved (curvature) or the map is dense "
-                   "(density)")
+    app.add_option(
+           "--size-by", size_by_,
+           "cgal, tetgen: small tetrahedra where the surface is curved (curvature) or the map is dense "
+           "(density)")
         ->check(CLI::IsMember({"curvature", "density"}).description(""));
     app.add_option("--size-range", size_range_, "cgal, tetgen: edges for --size-by, in Å as LOW:HIGH");
     app.add_flag("--optimize", optimize,
@@ -128,11 +145,15 @@ void TetFlags::add(CLI::App& app) {
         ->capture_default_str();
 }
 
-void TetFlags::finish(const CLI::App& app, bool all) {
-    if (!all)
-        for (const Owned& row : owned_flags())
-            if (!method.empty() && !owns(row, method))
-                refuse_flags(app, {row.flag}, "belongs to --method " + fmt::format("{}", fmt::join(row.methods, ", ")));
+void TetFlags::refuse_others(const CLI::App& app, const std::string& chosen) const {
+    for (const Owned& row : owned_flags())
+        if (!owns(row, chosen))
+            refuse_flags(
+                app, {row.flag},
+                fmt::format("belongs to --method {}, not to {}", fmt::join(row.methods, ", "), chosen));
+}
+
+void TetFlags::finish(const CLI::App& app) {
     parse("--cell", cell_);
     parse("--radius", radius_);
     parse("--distance", distance_);
@@ -157,7 +178,7 @@ void TetFlags::finish(const CLI::App& app, bool all) {
 }
 
 std::string TetFlags::method_for(TetSource source) const {
-    const std::string chosen = !method.empty()             ? method
+    const std::string chosen = !method.empty()               ? method
                                : source == TetSource::map    ? "stuffing"
                                : source == TetSource::labels ? "cgal"
                                                              : "tetgen";
@@ -179,12 +200,15 @@ std::string TetFlags::method_for(TetSource source) const {
 }
 
 std::vector<std::string> TetFlags::words_of(const CLI::App& app, const std::string& of) const {
+    static const std::vector<std::string> never{"--compare", "--json", "--quiet", "--threads"};
     std::vector<std::string> words;
     for (const CLI::Option* option : app.get_options()) {
         const std::string name = option->get_name();
         if (option->count() == 0 || name.rfind("--", 0) != 0) continue;
+        if (std::find(never.begin(), never.end(), name) != never.end()) continue;
         const auto& table = owned_flags();
-        const auto row = std::find_if(table.begin(), table.end(), [&](const Owned& o) { return o.flag == name; });
+        const auto row =
+            std::find_if(table.begin(), table.end(), [&](const Owned& o) { return o.flag == name; });
         if (row != table.end() && !owns(*row, of)) continue;
         words.push_back(name);
         if (option->get_items_expected_max() > 0)

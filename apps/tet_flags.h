@@ -40,9 +40,10 @@ class TetFlags {
     std::string optimize_bounds = "20:130";
 
     void add(CLI::App& app);
-    /// Turns texts into options; throws UsageError, for flags of other methods too (with `all`: those of any
-    /// method are allowed, for --compare).
-    void finish(const CLI::App& app, bool all);
+    /// Turns texts into options; throws UsageError.
+    void finish(const CLI::App& app);
+    /// UsageError for flags that this method does not have.
+    void refuse_others(const CLI::App& app, const std::string& method) const;
     /// The method for a source, checked: UsageError where it cannot take it, or is not in this build.
     std::string method_for(TetSource source) const;
     /// The command-line words that the flags of this method were given by.

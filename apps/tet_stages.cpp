@@ -32,8 +32,8 @@ TriMesh kept(TriMesh mesh, const std::string& file, const TetComponentFilter& fi
     if (!filter.any()) return mesh;
     mesh = filter_components(mesh, surface_filter(filter));
     if (mesh.empty())
-        throw NumericalError(fmt::format(
-            "{}: no piece is left; drop fewer (--keep-largest, --min-volume)", file));
+        throw NumericalError(
+            fmt::format("{}: no piece is left; drop fewer (--keep-largest, --min-volume)", file));
     return mesh;
 }
 
@@ -139,10 +139,11 @@ TetInput tet_input(const std::string& file, TriMesh mesh, const TetComponentFilt
     naming(file, [&] {
         require(measures, {true, true, false, true}, "tetrahedralize");
         if (*measures.volume_A3 <= 0)
-            throw InvalidInput(fmt::format(
-                "tetrahedralize needs normals that point outward: the surface is inside out (volume {:.4g} Å³); "
-                "try repair",
-                *measures.volume_A3));
+            throw InvalidInput(
+                fmt::format("tetrahedralize needs normals that point outward: the surface is inside out "
+                            "(volume {:.4g} Å³); "
+                            "try repair",
+                            *measures.volume_A3));
     });
     TetInput input;
     input.file = file;

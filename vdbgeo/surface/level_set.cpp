@@ -318,7 +318,8 @@ FloatGrid::Ptr mesh_level_set(const TriMesh& mesh, double voxel_A, const LevelSe
         far = std::max(far, points[v].cwiseAbs().maxCoeff());
     }
     if (far / voxel_A > (1 << 29))
-        throw InvalidInput(fmt::format("a voxel of {} Å is too small for a mesh that reaches {} Å", voxel_A, far));
+        throw InvalidInput(
+            fmt::format("a voxel of {} Å is too small for a mesh that reaches {} Å", voxel_A, far));
     Target target;
     target.same = false;
     target.frame.axes = voxel_A * Mat3d::Identity();
@@ -329,8 +330,8 @@ FloatGrid::Ptr mesh_level_set(const TriMesh& mesh, double voxel_A, const LevelSe
     };
     const float width = band_width(options.half_width, voxel_A);
     const TriMesh parts = in_small_parts(mesh, 2 * voxel_A);
-    const auto grid = level_set_grid(
-        signed_band(TriangleCells(parts, target), side_of, options.half_width, width, progress.part(0.1, 0.95)));
+    const auto grid = level_set_grid(signed_band(TriangleCells(parts, target), side_of, options.half_width,
+                                                 width, progress.part(0.1, 0.95)));
     grid->setTransform(transform_of(target.frame));
     grid->setName("surface");
     progress.report(1);

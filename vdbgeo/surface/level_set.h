@@ -34,14 +34,14 @@ struct LevelSetOptions {
 openvdb::FloatGrid::Ptr level_set(const DensityMap& map, double isovalue, const LevelSetOptions& options = {},
                                   const Progress& progress = {});
 
-/// The same for a closed mesh: the signed distance to its triangles on cubes of `voxel_A` (Å) whose centres are
-/// at multiples of it. Inside is where the line up goes through an odd number of faces (MeshSolid), so that
-/// cavities, shells in cavities and faces turned inward all come out right. An open mesh has no inside: its
-/// level set means nothing (require, of measure, refuses it).
+/// The same for a closed mesh: the signed distance to its triangles on cubes of `voxel_A` (Å) whose centres
+/// are at multiples of it. Inside is where the line up goes through an odd number of faces (MeshSolid), so
+/// that cavities, shells in cavities and faces turned inward all come out right. An open mesh has no inside:
+/// its level set means nothing (require, of measure, refuses it).
 ///
 /// Cost: some µs a voxel of the band. Throws InvalidInput for a mesh without faces and a voxel that is not a
 /// number above 0, or so small that the mesh has 2^30 of them along an axis; Cancelled.
-openvdb::FloatGrid::Ptr mesh_level_set(const TriMesh& mesh, double voxel_A, const LevelSetOptions& options = {},
-                                       const Progress& progress = {});
+openvdb::FloatGrid::Ptr mesh_level_set(const TriMesh& mesh, double voxel_A,
+                                       const LevelSetOptions& options = {}, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -34,8 +34,8 @@ struct TetComponentFilter {
     void check() const;
 };
 
-/// The pieces that the filter keeps, with their vertices, regions and properties, in order; faces are set anew.
-/// Where all stay the mesh comes back as it is.
+/// The pieces that the filter keeps, with their vertices, regions and properties, in order; faces are set
+/// anew. Where all stay the mesh comes back as it is.
 TetMesh filter_tet_components(TetMesh mesh, const TetComponentFilter& filter);
 
 }  // namespace vdbgeo

@@ -5,6 +5,8 @@
 namespace vdbgeo {
 
 void TetOptimizeOptions::check() const {}
-TetOptimizeReport optimize_tets(TetMesh&, const TetOptimizeOptions&, const Progress&) { throw NumericalError("not there yet"); }
+TetOptimizeReport optimize_tets(TetMesh&, const TetOptimizeOptions&, const Progress&) {
+    throw NumericalError("not there yet");
+}
 
 }  // namespace vdbgeo

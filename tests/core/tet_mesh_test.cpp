@@ -170,30 +170,20 @@ TEST(TetAdjacency, TellsTheSameFaultWithAnyThreads) {
     EXPECT_EQ(told[2], told[0]);
 }
 
-// Faces that share their middle vertex and mix to the same number all the same: low and high are chosen so.
-TEST(TetAdjacency, TellsApartFacesThatMixToTheSame) {
-    // low * 0x9E3779B1 + high is equal modulo 2^32 for (0, high + 0x9E3779B1) and (1, high): too many points
-    // to make. With low a and a + k, the difference of the highs is k * 0x9E3779B1 modulo 2^32, which is
-    // small for some k.
-    std::uint32_t k = 1, gap = 0x9E3779B1u;
-    while (std::min(gap, 0u - gap) > 200000u) gap = ++k * 0x9E3779B1u;
-    const bool less = gap > 0x80000000u;  // the second high is larger by −gap, else smaller by gap
-    const std::uint32_t apart = less ? 0u - gap : gap;
-    TetMesh mesh;
-    mesh.points.resize(3 * (k + apart) + 100, Vec3d::Zero());
-    const VertexId middle = k + 10, base = middle + 10 + apart;
-    const VertexId low1 = 5, low2 = 5 + k, high1 = base, high2 = less ? base + apart : base - apart;
-    ASSERT_EQ(low1 * 0x9E3779B1u + high1, low2 * 0x9E3779B1u + high2);
-    const VertexId last = static_cast<VertexId>(mesh.points.size()) - 1;
-    mesh.tets = {{low1, middle, high1, last},
-                 {low2, middle, high2, last - 1},
-                 {middle, low1, high1, last - 2},
-                 {middle, low2, high2, last - 3}};
-    const auto neighbour = tet_adjacency(mesh).neighbour;
-    EXPECT_EQ(neighbour[0], (std::array<std::uint32_t, 4>{none, none, none, 2}));
-    EXPECT_EQ(neighbour[1], (std::array<std::uint32_t, 4>{none, none, none, 3}));
-    EXPECT_EQ(neighbour[2], (std::array<std::uint32_t, 4>{none, none, none, 0}));
-    EXPECT_EQ(neighbour[3], (std::array<std::uint32_t, 4>{none, none, none, 1}));
+// All tetrahedra around one vertex, whose number is between those of the others: one bucket has most faces.
+TEST(TetAdjacency, OfAFullBucket) {
+    TetMesh mesh = kuhn_box(20, 20, 20);
+    set_faces(mesh);
+    Array<Triangle> shell = mesh.faces;
+    const auto hub = static_cast<VertexId>(mesh.points.size() / 2);
+    mesh.points[hub] = Vec3d::Constant(10.1);  // inside the box: no face of the shell has it
+    mesh.tets.clear();
+    for (const Triangle& f : shell) mesh.tets.push_back(turned_right(mesh.points, {f[0], f[1], f[2], hub}));
+    const TetAdjacency fast = tet_adjacency(mesh);
+    const auto slow = slow_adjacency(mesh);
+    EXPECT_TRUE(std::equal(slow.begin(), slow.end(), fast.neighbour.begin()));
+    set_faces(mesh);
+    EXPECT_EQ(mesh.faces.size(), shell.size());
 }
 
 TEST(TetMesh, FacesAreThoseOfTheRegions) {

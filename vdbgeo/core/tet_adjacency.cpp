@@ -38,26 +38,9 @@ Face face_of(const Tetrahedron& t, std::uint32_t k) {
     return {v[0], v[1], v[2], even};
 }
 
-/// The faces of a tetrahedron wait for their partners in the bucket of their middle corner (which divides
-/// them more evenly than the lowest), as numbers that sort by the other two corners, or nearly so: the upper
-/// half mixes both, the lower is the half-face 4 t + k. What mixes to the same and is not is told apart
-/// later.
-struct Bucketed {
-    VertexId bucket;
-    std::uint64_t entry;
-};
-
-Bucketed bucketed(const Tetrahedron& t, std::uint32_t tet, std::uint32_t k) {
-    const Face f = face_of(t, k);
-    const std::uint32_t mixed = f.low * 0x9E3779B1u + f.high;
-    return {f.middle, std::uint64_t{mixed} << 32 | (4 * tet + k)};
-}
-
-std::uint32_t mixed_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry >> 32); }
-std::uint32_t half_face_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry); }
-
-/// The two corners by which the faces of a tetrahedron are in buckets: the second and third by number, each
-/// for two faces.
+/// The two inner corners of a tetrahedron by number. Each is the middle corner of two of its faces: the faces
+/// wait for their partners in the bucket of their middle corner, which divides them more evenly than the
+/// lowest one, and a bucket needs to hold the tetrahedron only.
 std::pair<VertexId, VertexId> inner_corners(const Tetrahedron& t) {
     const auto [a, b] = std::minmax(t[0], t[1]);
     const auto [c, d] = std::minmax(t[2], t[3]);
@@ -83,17 +66,17 @@ void refuse_repeated_vertices(const TetMesh& mesh) {
         fmt::format("tetrahedron {} names vertex {} twice", first, *std::adjacent_find(v.begin(), v.end())));
 }
 
-/// All half-faces by their buckets: those of vertex v end at end[v], where those of v + 1 begin. Threads
-/// count and place together: the order within a bucket is any, and is sorted away.
+/// The tetrahedra by their inner corners: those of vertex v end at end[v], where those of v + 1 begin.
+/// Threads count and place together; what comes out does not depend on the order within a bucket.
 struct Buckets {
     std::vector<std::atomic<std::uint32_t>> end;
-    Array<std::uint64_t> entries;
+    Array<std::uint32_t> tets;
 
-    explicit Buckets(const TetMesh& mesh) : end(mesh.points.size()) {
+    explicit Buckets(const TetMesh& mesh) : end(mesh.points.size()), tets(2 * mesh.tets.size()) {
         parallel_for(mesh.tets.size(), grain, [&](std::size_t t) {
             const auto [second, third] = inner_corners(mesh.tets[t]);
-            end[second].fetch_add(2, std::memory_order_relaxed);
-            end[third].fetch_add(2, std::memory_order_relaxed);
+            end[second].fetch_add(1, std::memory_order_relaxed);
+            end[third].fetch_add(1, std::memory_order_relaxed);
         });
         std::uint32_t sum = 0;
         for (auto& e : end) {
@@ -101,72 +84,92 @@ struct Buckets {
             e.store(sum, std::memory_order_relaxed);
             sum += count;
         }
-        entries.resize(sum);
         parallel_for(mesh.tets.size(), grain, [&](std::size_t t) {
-            for (std::uint32_t k = 0; k < 4; ++k) {
-                const Bucketed b = bucketed(mesh.tets[t], static_cast<std::uint32_t>(t), k);
-                entries[end[b.bucket].fetch_add(1, std::memory_order_relaxed)] = b.entry;
-            }
+            const auto [second, third] = inner_corners(mesh.tets[t]);
+            tets[end[second].fetch_add(1, std::memory_order_relaxed)] = static_cast<std::uint32_t>(t);
+            tets[end[third].fetch_add(1, std::memory_order_relaxed)] = static_cast<std::uint32_t>(t);
         });
     }
 };
 
-/// Pairs the faces of a bucket.
+/// Pairs the faces of a bucket in a small hash table.
 class Pairing {
  public:
     Pairing(const TetMesh& mesh, TetAdjacency& out) : mesh_(mesh), out_(out) {}
 
-    /// Sorts [begin, end) and pairs what is equal. Returns what is wrong, or nothing.
-    std::string pair(std::uint64_t* begin, std::uint64_t* end) {
-        std::sort(begin, end);
-        while (begin != end) {
-            std::uint64_t* stop = begin + 1;
-            while (stop != end && mixed_of(*stop) == mixed_of(*begin)) ++stop;
-            if (stop - begin > 1) {
-                std::string wrong = pair_alike(begin, stop);
-                if (!wrong.empty()) return wrong;
+    /// Pairs the faces of the tetrahedra [begin, end) whose middle corner is `vertex`. Returns what is wrong,
+    /// or nothing.
+    std::string pair(VertexId vertex, const std::uint32_t* begin, const std::uint32_t* end) {
+        prepare(2 * static_cast<std::size_t>(end - begin));
+        bool good = true;
+        for (const std::uint32_t* t = begin; t != end && good; ++t)
+            for (std::uint32_t k = 0; k < 4; ++k) {
+                const Face f = face_of(mesh_.tets[*t], k);
+                if (f.middle == vertex) good = good && meet(f, 4 * *t + k);
             }
-            begin = stop;
-        }
-        return {};
+        return good ? std::string() : explain(vertex, begin, end);
     }
 
  private:
-    struct Keyed {
-        Face face;
+    /// Half-faces end at 2^32 − 5, as there are fewer than 2^30 tetrahedra.
+    static constexpr std::uint32_t empty = 0xFFFFFFFFu, paired = 0xFFFFFFFEu;
+    struct Slot {
+        std::uint64_t key;
         std::uint32_t half_face;
-        auto key() const { return std::tie(face.low, face.high); }
+        bool even;
     };
 
-    std::string pair_alike(const std::uint64_t* begin, const std::uint64_t* end) {
-        faces_.clear();
-        for (; begin != end; ++begin) {
-            const std::uint32_t h = half_face_of(*begin);
-            faces_.push_back({face_of(mesh_.tets[h / 4], h % 4), h});
+    /// An empty table of twice as many places as there are faces, or more.
+    void prepare(std::size_t faces) {
+        std::size_t size = 16;
+        while (size < 2 * faces) size *= 2;
+        table_.assign(size, Slot{0, empty, false});
+    }
+
+    /// Puts a face down, or pairs it with the one that waits. False where the face cannot be.
+    bool meet(const Face& f, std::uint32_t half_face) {
+        const std::uint64_t key = std::uint64_t{f.low} << 32 | f.high;
+        const std::size_t mask = table_.size() - 1;
+        for (std::size_t i = (key * 0x9E3779B97F4A7C15ull) >> 32 & mask;; i = (i + 1) & mask) {
+            Slot& slot = table_[i];
+            if (slot.half_face == empty) {
+                slot = {key, half_face, f.even};
+                return true;
+            }
+            if (slot.key != key) continue;
+            if (slot.half_face == paired || slot.even == f.even) return false;
+            out_.neighbour[slot.half_face / 4][slot.half_face % 4] = half_face / 4;
+            out_.neighbour[half_face / 4][half_face % 4] = slot.half_face / 4;
+            slot.half_face = paired;
+            return true;
         }
-        if (faces_.size() > 2)
-            std::sort(faces_.begin(), faces_.end(), [](const Keyed& a, const Keyed& b) {
-                return std::tie(a.face.low, a.face.high, a.half_face) <
-                       std::tie(b.face.low, b.face.high, b.half_face);
-            });
-        for (std::size_t i = 0; i + 1 < faces_.size(); ++i) {
-            const Keyed &a = faces_[i], &b = faces_[i + 1];
-            if (a.key() != b.key()) continue;
-            const bool third = i + 2 < faces_.size() && faces_[i + 2].key() == a.key();
-            if (third || a.face.even == b.face.even)
-                return fmt::format("the triangle of vertices {}, {}, {} has {}", a.face.low, a.face.middle,
-                                   a.face.high,
+    }
+
+    /// The first fault by number among the faces of a bucket.
+    std::string explain(VertexId vertex, const std::uint32_t* begin, const std::uint32_t* end) const {
+        std::vector<std::tuple<VertexId, VertexId, bool>> faces;
+        for (; begin != end; ++begin)
+            for (std::uint32_t k = 0; k < 4; ++k) {
+                const Face f = face_of(mesh_.tets[*begin], k);
+                if (f.middle == vertex) faces.emplace_back(f.low, f.high, f.even);
+            }
+        std::sort(faces.begin(), faces.end());
+        for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
+            const auto& [low, high, even] = faces[i];
+            const auto like = [&](std::size_t j) {
+                return j < faces.size() && std::get<0>(faces[j]) == low && std::get<1>(faces[j]) == high;
+            };
+            const bool third = like(i + 1) && like(i + 2);
+            if (third || (like(i + 1) && std::get<2>(faces[i + 1]) == even))
+                return fmt::format("the triangle of vertices {}, {}, {} has {}", low, vertex, high,
                                    third ? "more than two tetrahedra" : "two tetrahedra on the same side");
-            out_.neighbour[a.half_face / 4][a.half_face % 4] = b.half_face / 4;
-            out_.neighbour[b.half_face / 4][b.half_face % 4] = a.half_face / 4;
-            ++i;
         }
-        return {};
+        return "the faces of the tetrahedra cannot be paired";  // no way leads here
     }
 
     const TetMesh& mesh_;
     TetAdjacency& out_;
-    std::vector<Keyed> faces_;
+    std::vector<Slot> table_;
 };
 
 }  // namespace
@@ -188,7 +191,8 @@ TetAdjacency tet_adjacency(const TetMesh& mesh) {
             std::uint32_t at = begin == 0 ? 0 : buckets.end[begin - 1].load(std::memory_order_relaxed);
             for (std::size_t v = begin; v < end; ++v) {
                 const std::uint32_t stop = buckets.end[v].load(std::memory_order_relaxed);
-                std::string found = pairing.pair(buckets.entries.data() + at, buckets.entries.data() + stop);
+                std::string found = pairing.pair(static_cast<VertexId>(v), buckets.tets.data() + at,
+                                                 buckets.tets.data() + stop);
                 if (!found.empty()) return found;
                 at = stop;
             }

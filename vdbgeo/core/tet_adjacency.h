@@ -17,7 +17,8 @@ struct TetAdjacency {
 
 /// Pairs the faces of a mesh with good indices (see check()). Throws InvalidInput where a triangle has more
 /// than two tetrahedra, or two on the same side (an overlap), where a tetrahedron names a vertex twice, and
-/// for 2^30 tetrahedra or more. Cost: O(n), 16 bytes a tetrahedron and 32 for a moment; in parallel.
+/// for 2^30 tetrahedra or more. Cost: O(n), in parallel: some 60 ns a tetrahedron on one core where
+/// neighbours are near each other in memory; 16 bytes a tetrahedron, and for a moment 8 and 4 a vertex.
 TetAdjacency tet_adjacency(const TetMesh& mesh);
 
 }  // namespace vdbgeo

@@ -10,6 +10,9 @@
 
 namespace vdbgeo {
 
+/// The property that is 1 on faces that were cut open and 0 on the old boundary.
+inline constexpr const char* interior_property = "interior";
+
 /// What is taken away. Exactly one of `plane` and `peel` is set.
 struct CutawayOptions {
     struct Plane {
@@ -31,17 +34,24 @@ struct CutawayOptions {
     void check() const;
 };
 
-/// The boundary of what is left, as triangles with normals outward; every face has its own three vertices
-/// where vertex colours would blend otherwise: vertices are shared among the old boundary's faces only.
+/// The boundary of what is left, as triangles with normals outward. Faces that were cut open have three
+/// vertices of their own, so that vertex colours do not blend; those of the old boundary share theirs among
+/// each other. By its points the surface is closed: it encloses the volume of what is left.
 ///
-/// Face properties: `interior` (1 on faces that were cut open), `region`, and min_dihedral_deg, radius_edge,
-/// volume_A3 of the tetrahedron behind. Vertex properties of the same names hold the same numbers for the
-/// faces that were cut open, so that a picture can be coloured by them, and on the old boundary NaN.
+/// Face properties: `interior` (1 on faces that were cut open, else 0), `region`, and min_dihedral_deg,
+/// radius_edge, volume_A3 of the whole tetrahedron behind (tet_quality.h). Vertex properties of the same
+/// names hold the same numbers for the faces that were cut open, so that pictures can be coloured by them; on
+/// the old boundary they are NaN (`interior`: 0).
+///
+/// A flat cut keeps what has n·(p − point) < 0. Points nearer to the plane than 1e-12 of the mesh's extent
+/// count as on it, so that a plane through lattice points cuts no splinters. A tetrahedron gives a triangle,
+/// or two by the shorter diagonal; points on an edge are the same bits for all tetrahedra around it.
 ///
 /// A peel goes breadth first from the tetrahedron behind the seed face, through faces, neighbours by their
-/// number (§3.4, Fig 16); it stops early where a component ends. Throws InvalidInput for options out of
-/// range, a mesh without tetrahedra and a seed face that is not on the boundary; NumericalError where nothing
-/// is left. Cost: that of tet_adjacency.
+/// number (§3.4, Fig 16); it stops early where a component ends. It needs the mesh's `faces`.
+///
+/// Throws InvalidInput for options out of range, a damaged mesh or one without tetrahedra, and a seed face
+/// that is not on the boundary; NumericalError where nothing is left. Cost: that of tet_adjacency.
 TriMesh cutaway(const TetMesh& mesh, const CutawayOptions& options, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -5,6 +5,8 @@
 namespace vdbgeo {
 
 void CutawayOptions::check() const {}
-TriMesh cutaway(const TetMesh&, const CutawayOptions&, const Progress&) { throw NumericalError("not there yet"); }
+TriMesh cutaway(const TetMesh&, const CutawayOptions&, const Progress&) {
+    throw NumericalError("not there yet");
+}
 
 }  // namespace vdbgeo

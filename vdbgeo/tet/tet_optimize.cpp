@@ -1,12 +1,78 @@
 #include "vdbgeo/tet/tet_optimize.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/tet/tet_flips.h"
+#include "vdbgeo/tet/tet_moves.h"
+#include "vdbgeo/tet/tet_store.h"
 
 namespace vdbgeo {
+namespace {
 
-void TetOptimizeOptions::check() const {}
-TetOptimizeReport optimize_tets(TetMesh&, const TetOptimizeOptions&, const Progress&) {
-    throw NumericalError("not there yet");
+/// The vertices of some tetrahedra, and with `ring` those of all tetrahedra around them; sorted.
+std::vector<VertexId> vertices_of(const TetStore& store, const std::vector<std::uint32_t>& tets, bool ring) {
+    std::vector<bool> seen(store.vertex_count(), false);
+    for (const std::uint32_t t : tets)
+        for (const VertexId v : store.tet(t)) {
+            if (!ring) {
+                seen[v] = true;
+                continue;
+            }
+            for (const std::uint32_t n : store.star(v))
+                for (const VertexId w : store.tet(n)) seen[w] = true;
+        }
+    std::vector<VertexId> out;
+    for (std::size_t v = 0; v < seen.size(); ++v)
+        if (seen[v]) out.push_back(static_cast<VertexId>(v));
+    return out;
+}
+
+}  // namespace
+
+void TetOptimizeOptions::check() const {
+    if (!(min_dihedral_deg >= 1 && min_dihedral_deg <= 70))
+        throw InvalidInput(
+            fmt::format("optimize: the smallest dihedral angle is {}°, not in 1…70", min_dihedral_deg));
+    if (!(max_dihedral_deg >= 71 && max_dihedral_deg <= 179))
+        throw InvalidInput(
+            fmt::format("optimize: the largest dihedral angle is {}°, not in 71…179", max_dihedral_deg));
+    if (rounds < 0) throw InvalidInput(fmt::format("optimize: {} rounds", rounds));
+}
+
+TetOptimizeReport optimize_tets(TetMesh& mesh, const TetOptimizeOptions& options, const Progress& progress) {
+    options.check();
+    check(mesh, "optimize");
+    progress.report(0);
+    const DihedralBounds bounds(options.min_dihedral_deg, options.max_dihedral_deg);
+    TetStore store(mesh, bounds, static_cast<bool>(options.onto_surface));
+    TetOptimizeReport report;
+    std::vector<std::uint32_t> bad = store.worse_than(1);
+    report.outside_before = report.outside_after = bad.size();
+    std::vector<std::uint32_t> vertices_tried(store.vertex_count(), 0), tets_tried;
+    std::uint32_t epoch = 0;
+    while (report.rounds < options.rounds && !bad.empty()) {
+        const Progress part = progress.part(static_cast<double>(report.rounds) / options.rounds,
+                                            static_cast<double>(report.rounds + 1) / options.rounds);
+        std::uint64_t moves = 0, flips = 0;
+        if (options.flips) flips = flip_tets(store, bad, tets_tried, epoch);
+        moves = move_vertices(store, vertices_of(store, store.worse_than(1), report.rounds % 2 == 1),
+                              options.onto_surface, vertices_tried, epoch, part);
+        ++report.rounds;
+        report.moves += moves;
+        report.flips += flips;
+        bad = store.worse_than(1);
+        if (moves + flips == 0) break;
+    }
+    report.outside_after = bad.size();
+    if (report.moves + report.flips > 0) {
+        store.give_to(mesh);
+        set_faces(mesh);
+    }
+    progress.report(1);
+    return report;
 }
 
 }  // namespace vdbgeo

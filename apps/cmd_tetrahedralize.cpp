@@ -191,8 +191,45 @@ void check_flags(TetrahedralizeOptions& o, const CLI::App& flags) {
 }  // namespace
 
 Command tetrahedralize_command() {
-    return {"tetrahedralize", "not there yet", "",
-            [](CLI::App&) { return [](Session&) { throw NumericalError("not there yet"); }; }};
+    return {"tetrahedralize",
+            "Fill the surface of a map, the labels of a segmentation, or a closed mesh with tetrahedra",
+            "  vdbgeo tetrahedralize emd_1080.map groel.vtu --iso 0.8 --optimize\n"
+            "  vdbgeo tetrahedralize groel.ply groel.msh --method tetgen --radius-edge 1.2\n"
+            "  vdbgeo tetrahedralize emd_1080.map groel-methods --iso 0.8 --compare",
+            [](CLI::App& app) {
+                auto o = std::make_shared<TetrahedralizeOptions>();
+                app.add_option("in", o->in,
+                               "Map (MRC, CCP4), VDB grid, or closed mesh: " + mesh_endings_text())
+                    ->required();
+                app.add_option("out", o->out,
+                               "Tetrahedra to write: " + tet_endings_text() +
+                                   "; with --compare a folder for a table, a picture and the meshes")
+                    ->required();
+                o->iso.add(app);
+                app.add_option(
+                    "--labels", o->labels,
+                    "The map is a segmentation: fill all its labels, or a list such as 1,2,5, a region "
+                    "each");
+                app.add_flag("--compare", o->compare, "Run all methods: a table and a picture of cutaways");
+                o->tets.add(app);
+                app.add_option("--keep-largest", o->filter.keep_largest,
+                               "Keep this many pieces, the largest [all]");
+                app.add_option("--min-volume", o->filter.min_volume_A3,
+                               "Drop pieces of less than this volume, in Å³")
+                    ->capture_default_str();
+                app.add_flag("--no-distance", o->no_distance,
+                             "Do not measure how far the boundary is from the surface");
+                app.add_option("--histogram", o->histogram, "Histogram of the dihedral angles, a .png");
+                o->map.add_reading(app);
+                o->map.add_sparsify(app);
+                return [o, flags = &app](Session& session) {
+                    check_flags(*o, *flags);
+                    if (o->compare)
+                        run_compare(*o, *flags, session);
+                    else
+                        run_tetrahedralize(*o, session);
+                };
+            }};
 }
 
 }  // namespace vdbgeo::app

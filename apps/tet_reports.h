@@ -11,7 +11,8 @@
 namespace vdbgeo::app {
 
 /// vertices, tets, volume_A3, min_dihedral_deg, max_dihedral_deg, radius_edge_max, radius_edge_mean, slivers,
-/// and more.
+/// inverted, boundary_faces, mean_min_dihedral_deg, min_dihedral_p01_deg, min_tet_volume_A3,
+/// max_tet_volume_A3, mean_edge_A, min_edge_A, max_edge_A; regions[]: region, tets, volume_A3.
 Json tets_json(const TetQuality& quality);
 std::vector<std::string> tets_text(const TetQuality& quality);
 

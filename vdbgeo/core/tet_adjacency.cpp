@@ -178,28 +178,8 @@ TetAdjacency tet_adjacency(const TetMesh& mesh) {
     if (mesh.tets.size() >= (std::size_t{1} << 30))
         throw InvalidInput(
             fmt::format("{} tetrahedra, more than the 2^30-1 whose faces can be paired", mesh.tets.size()));
-    const std::uint32_t count = static_cast<std::uint32_t>(4 * mesh.tets.size());
-    Array<std::uint32_t> start(mesh.points.size() + 1), order(count);
-    std::fill(start.begin(), start.end(), 0u);
-    const auto low_of = [&](std::uint32_t h) {
-        const Tetrahedron& t = mesh.tets[h / 4];
-        const auto& c = tet_faces[h % 4];
-        return std::min({t[static_cast<std::size_t>(c[0])], t[static_cast<std::size_t>(c[1])],
-                         t[static_cast<std::size_t>(c[2])]});
-    };
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        Tetrahedron v = mesh.tets[t];
-        std::sort(v.begin(), v.end());
-        if (v[0] == v[1] || v[1] == v[2] || v[2] == v[3])
-            throw InvalidInput(fmt::format("tetrahedron {} names vertex {} twice", t,
-                                           v[0] == v[1]   ? v[0]
-                                           : v[2] == v[1] ? v[1]
-                                                          : v[2]));
-    }
-    for (std::uint32_t h = 0; h < count; ++h) ++start[low_of(h) + std::size_t{1}];
-    for (std::size_t v = 0; v < mesh.points.size(); ++v) start[v + 1] += start[v];
-    for (std::uint32_t h = 0; h < count; ++h) order[start[low_of(h)]++] = h;  // start[v] is now the end of v
-
+    refuse_repeated_vertices(mesh);
+    Buckets buckets(mesh);
     TetAdjacency out;
     out.neighbour.resize(mesh.tets.size());
     parallel_for(mesh.tets.size(), grain, [&](std::size_t t) { out.neighbour[t].fill(none); });
@@ -216,24 +196,12 @@ TetAdjacency tet_adjacency(const TetMesh& mesh) {
                 if (!found.empty()) return found;
                 at = stop;
             }
-            std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-                return std::tie(a.middle, a.high, a.half_face) < std::tie(b.middle, b.high, b.half_face);
-            });
-            for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
-                const Key &a = keys[i], &b = keys[i + 1];
-                if (a.middle != b.middle || a.high != b.high) continue;
-                const bool third =
-                    i + 2 < keys.size() && keys[i + 2].middle == a.middle && keys[i + 2].high == a.high;
-                if (third || a.even == b.even)
-                    throw InvalidInput(
-                        fmt::format("the triangle of vertices {}, {}, {} has {}", v, a.middle, a.high,
-                                    third ? "more than two tetrahedra" : "two tetrahedra on the same side"));
-                out.neighbour[a.half_face / 4][a.half_face % 4] = b.half_face / 4;
-                out.neighbour[b.half_face / 4][b.half_face % 4] = a.half_face / 4;
-                ++i;
-            }
-        }
-    });
+            return std::string();
+        },
+        [](std::string& all, const std::string& part) {
+            if (all.empty()) all = part;
+        });
+    if (!wrong.empty()) throw InvalidInput(wrong);
     return out;
 }
 

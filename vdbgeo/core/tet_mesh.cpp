@@ -92,10 +92,11 @@ void check(const TetMesh& mesh, const std::string& what) {
     if (!mesh.regions.empty() && mesh.regions.size() != mesh.tets.size())
         throw InvalidInput(
             fmt::format("{}: {} regions for {} tetrahedra", what, mesh.regions.size(), mesh.tets.size()));
-    for (std::size_t t = 0; t < mesh.regions.size(); ++t)
-        if (mesh.regions[t] < 1)
-            throw InvalidInput(fmt::format("{}: tetrahedron {} is in region {}; regions count from 1", what,
-                                           t, mesh.regions[t]));
+    if (const std::size_t t =
+            first_bad(mesh.regions.size(), [&](std::size_t i) { return mesh.regions[i] >= 1; });
+        t < mesh.regions.size())
+        throw InvalidInput(fmt::format("{}: tetrahedron {} is in region {}; regions count from 1", what, t,
+                                       mesh.regions[t]));
     if (mesh.face_regions.size() != mesh.faces.size())
         throw InvalidInput(fmt::format("{}: {} pairs of regions for {} faces", what, mesh.face_regions.size(),
                                        mesh.faces.size()));

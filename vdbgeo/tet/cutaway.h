@@ -48,9 +48,10 @@ struct CutawayOptions {
 /// or two by the shorter diagonal; points on an edge are the same bits for all tetrahedra around it.
 ///
 /// A peel goes breadth first from the tetrahedron behind the seed face, through faces, neighbours by their
-/// number (§3.4, Fig 16); it stops early where a component ends. Throws InvalidInput for options out of
-/// range, a mesh without tetrahedra and a seed face that is not on the boundary; NumericalError where nothing
-/// is left. Cost: that of tet_adjacency.
+/// number (§3.4, Fig 16); it stops early where a component ends. It needs the mesh's `faces`.
+///
+/// Throws InvalidInput for options out of range, a damaged mesh or one without tetrahedra, and a seed face
+/// that is not on the boundary; NumericalError where nothing is left. Cost: that of tet_adjacency.
 TriMesh cutaway(const TetMesh& mesh, const CutawayOptions& options, const Progress& progress = {});
 
 }  // namespace vdbgeo

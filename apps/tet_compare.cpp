@@ -14,7 +14,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "converters/tet_file.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/tet/cutaway.h"
+#include "vdbgeo/view/image.h"
+#include "vdbgeo/view/png.h"
+#include "vdbgeo/view/render.h"
+#include "vdbgeo/view/text.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -132,6 +138,34 @@ const std::vector<Column>& columns() {
     return table;
 }
 
+/// One mesh cut through the middle of its box, seen from the front.
+Image draw_cut_open(const MethodRun& run, int side) {
+    const TetMesh mesh = read_tets(run.file);
+    Vec3d low = mesh.points[0], high = low;
+    for (const Vec3d& p : mesh.points) {
+        low = low.cwiseMin(p);
+        high = high.cwiseMax(p);
+    }
+    CutawayOptions cut;
+    cut.plane.emplace();
+    cut.plane->point = (low + high) / 2;
+    cut.plane->normal = -Vec3d::UnitY();  // the half before the viewer goes
+    const TriMesh open = cutaway(mesh, cut);
+    RenderOptions o;
+    o.width = o.height.emplace(side);
+    o.view = "front";
+    o.edges = true;
+    o.property = "min_dihedral_deg";
+    o.label = "smallest dihedral angle (°)";
+    o.range_min = 0;
+    o.range_max = 70.5;
+    const Json& j = run.result;
+    o.title = fmt::format("{}: {} tets, {:.1f}° to {:.1f}°, {:.2g} s", run.method, j["tets"].get<std::uint64_t>(),
+                          j["min_dihedral_deg"].get<double>(), j["max_dihedral_deg"].get<double>(),
+                          seconds_of(j));
+    return render(open, o);
+}
+
 }  // namespace
 
 MethodRun run_method(const std::string& in, const std::string& method, const std::string& file,
@@ -199,8 +233,24 @@ std::vector<std::string> comparison_text(const std::vector<MethodRun>& runs) {
     return lines;
 }
 
-void draw_comparison(const std::vector<MethodRun>&, const std::string&, const std::string&, const Progress&) {
-    throw NumericalError("not there yet");
+void draw_comparison(const std::vector<MethodRun>& runs, const std::string& title, const std::string& path,
+                     const Progress& progress) {
+    constexpr int side = 900, head = 70;
+    const Vec3f ink(0.15f, 0.15f, 0.18f);
+    Image sheet(side * static_cast<int>(runs.size()), side + head);
+    draw_text(sheet, {sheet.width / 2.0, 0.65 * head}, title, 36, ink, TextAlign::centre);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const MethodRun& run = runs[i];
+        const int left = side * static_cast<int>(i);
+        progress.report(static_cast<double>(i) / static_cast<double>(runs.size()));
+        if (run.error.empty()) {
+            paste(sheet, draw_cut_open(run, side), left, head);
+        } else {
+            draw_text(sheet, {left + side / 2.0, head + side / 2.0}, run.method + ": failed", 36, ink,
+                      TextAlign::centre);
+        }
+    }
+    write_png(sheet, path);
 }
 
 }  // namespace vdbgeo::app

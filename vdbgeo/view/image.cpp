@@ -43,6 +43,13 @@ std::uint8_t to_byte(float channel) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
 }
 
+void paste(Image& image, const Image& piece, int x, int y) {
+    const int left = std::max(0, -x), right = std::min(piece.width, image.width - x);
+    if (left >= right) return;
+    for (int row = std::max(0, -y); row < std::min(piece.height, image.height - y); ++row)
+        std::copy_n(piece.at(left, row), 3 * (right - left), image.at(x + left, y + row));
+}
+
 void blend(Image& image, int x, int y, const Vec3f& colour, double cover) {
     if (x < 0 || y < 0 || x >= image.width || y >= image.height || !(cover > 0)) return;
     const float c = static_cast<float>(std::min(cover, 1.0));

@@ -37,6 +37,9 @@ struct Image {
 /// The nearest 8-bit value of a channel; what lies outside 0…1 is clamped.
 std::uint8_t to_byte(float channel);
 
+/// Copies `piece` with its upper left corner at pixel (x, y); what lies outside is left out.
+void paste(Image& image, const Image& piece, int x, int y);
+
 /// Mixes `colour` into one pixel: cover 0 leaves it, 1 replaces it. Pixels outside the image are ignored.
 void blend(Image& image, int x, int y, const Vec3f& colour, double cover);
 

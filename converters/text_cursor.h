@@ -34,6 +34,9 @@ class TextCursor {
     float number(const char* what);
     /// `text`, a word of this line, as such a number.
     float number_in(std::string_view text, const char* what) const;
+    /// The same as doubles.
+    double real(const char* what);
+    double real_in(std::string_view text, const char* what) const;
     std::int64_t integer(const char* what);
     /// `text`, a part of a word of this line, as a whole number.
     std::int64_t integer_in(std::string_view text, const char* what) const;

@@ -89,6 +89,13 @@ std::string_view TextCursor::word() {
     return {first, static_cast<std::size_t>(at_ - first)};
 }
 
+std::string_view TextCursor::next_word() {
+    for (;;) {
+        if (const std::string_view found = word(); !found.empty()) return found;
+        if (!next_line()) return {};
+    }
+}
+
 void TextCursor::expect_line_end() {
     if (const std::string_view more = word(); !more.empty())
         fail(fmt::format("expected the end of the line, found {}", in_quotes(more)));

@@ -24,6 +24,8 @@ class TextCursor {
     bool next_line();
     /// The next word of this line, empty at its end.
     std::string_view word();
+    /// The next word of this line or of those after it, empty at the end of the text.
+    std::string_view next_word();
     /// Passes over what this line still holds.
     void skip_line();
     /// Fails unless this line is used up.

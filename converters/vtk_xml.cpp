@@ -94,7 +94,8 @@ class Scanner {
         const std::size_t close = tag.empty ? tag.end : text_.find("</DataArray", tag.end);
         if (close == text_.npos) fail(tag, "the file ends within an array");
         const auto type = vtk_type(tag.attribute("type").value_or(""));
-        if (out_.pieces.empty() || section.empty() || !type) return close;  // of the file itself, or of strings
+        if (out_.pieces.empty() || section.empty() || !type)
+            return close;  // of the file itself, or of strings
         VtkArray array;
         array.name = tag.attribute("Name").value_or("");
         array.type = *type;

@@ -12,8 +12,8 @@ namespace vdbgeo {
 ///
 ///   q(θ)² with q(θ) = min( sin(θ/2) / sin(low/2), cos(θ/2) / cos(high/2) )
 ///
-/// by its cosine. It is 1 where an angle is on a bound, more between them and 0 at 0° and at 180°; q is nearly
-/// in proportion to an angle that is small, or what lacks one to 180° that is large.
+/// by its cosine. It is 1 where an angle is on a bound, more between them and 0 at 0° and at 180°; q is
+/// nearly in proportion to an angle that is small, or what lacks one to 180° that is large.
 struct DihedralBounds {
     double low_scale, high_scale;
 
@@ -27,8 +27,9 @@ struct DihedralBounds {
     }
 };
 
-/// What the worst dihedral angle of a tetrahedron is worth; 0 for a flat one, −1 for one turned over. By `base`,
-/// the unit normal of the face (p, q, r), counter-clockwise seen from outside, with x the corner opposite.
+/// What the worst dihedral angle of a tetrahedron is worth; 0 for a flat one, −1 for one turned over. By
+/// `base`, the unit normal of the face (p, q, r), counter-clockwise seen from outside, with x the corner
+/// opposite.
 inline double dihedral_worth(const DihedralBounds& bounds, const Vec3d& x, const Vec3d& p, const Vec3d& q,
                              const Vec3d& r, const Vec3d& base) {
     const Vec3d a = p - x, b = q - x, c = r - x;

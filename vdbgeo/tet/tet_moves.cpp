@@ -10,12 +10,13 @@
 namespace vdbgeo {
 namespace {
 
-constexpr int max_steps = 10;         // of one vertex in one go
+constexpr int max_steps = 10;  // of one vertex in one go
 constexpr int max_trials = 40;
-constexpr double least_gain = 1e-3;   // of q, relative: what is less is no step
-constexpr double wide = 0.7;          // angles within this of the worst q take part in the model
-constexpr double enough = 1.25;       // where q is this the vertex is left
-constexpr double least_edge = 0.5;    // of the edges' mean length: none is made shorter than this
+constexpr double least_gain = 1e-3;  // of q, relative: what is less is no step
+static const double wide =
+    getenv("WIDE") ? atof(getenv("WIDE")) : 0.7;  // angles within this of the worst q take part in the model
+constexpr double enough = 1.6;                    // where q is this the vertex is left
+constexpr double longest_radius = 2.5;            // over the shortest edge: none beyond it is made longer
 
 /// A tetrahedron around a vertex: the face opposite, and its outward unit normal.
 struct Petal {
@@ -40,21 +41,21 @@ class Star {
     void slopes(const Vec3d& x, double worst, std::vector<Slope>& out) const;
     /// Root of the mean square length of the edges at v.
     double size() const { return size_; }
-    /// Whether no edge would be shorter than it may be.
-    bool has_room(const Vec3d& x) const;
+    /// The largest square of circumradius over shortest edge at x.
+    double radius_edge_squared(const Vec3d& x) const;
 
  private:
     void petal_slopes(const Petal& petal, const Vec3d& x, double cut, std::vector<Slope>& out) const;
 
     const TetStore& store_;
     std::vector<Petal> petals_;
-    double size_ = 0, shortest_ = 0;
+    double size_ = 0;
 };
 
 void Star::gather(VertexId v) {
     petals_.clear();
     const Vec3d& x = store_.point(v);
-    double sum = 0, least = std::numeric_limits<double>::infinity();
+    double sum = 0;
     for (const std::uint32_t t : store_.star(v)) {
         const Tetrahedron& tet = store_.tet(t);
         const auto k = static_cast<std::size_t>(std::find(tet.begin(), tet.end(), v) - tet.begin());
@@ -65,21 +66,25 @@ void Star::gather(VertexId v) {
         const Vec3d n = (petal.q - petal.p).cross(petal.r - petal.p);
         const double length = n.norm();
         if (length > 0) petal.base = n / length;
-        const double lengths[3] = {(petal.p - x).squaredNorm(), (petal.q - x).squaredNorm(),
-                                   (petal.r - x).squaredNorm()};
-        sum += lengths[0] + lengths[1] + lengths[2];
-        least = std::min({least, lengths[0], lengths[1], lengths[2]});
+        sum += (petal.p - x).squaredNorm() + (petal.q - x).squaredNorm() + (petal.r - x).squaredNorm();
         petals_.push_back(petal);
     }
     size_ = petals_.empty() ? 0 : std::sqrt(sum / (3 * static_cast<double>(petals_.size())));
-    shortest_ = std::min(least, least_edge * least_edge * size_ * size_);
 }
 
-bool Star::has_room(const Vec3d& x) const {
-    return std::all_of(petals_.begin(), petals_.end(), [&](const Petal& s) {
-        return std::min({(s.p - x).squaredNorm(), (s.q - x).squaredNorm(), (s.r - x).squaredNorm()}) >=
-               shortest_;
-    });
+double Star::radius_edge_squared(const Vec3d& x) const {
+    double most = 0;
+    for (const Petal& s : petals_) {
+        const Vec3d a = s.p - x, b = s.q - x, c = s.r - x;
+        const double aa = a.squaredNorm(), bb = b.squaredNorm(), cc = c.squaredNorm();
+        const Vec3d bc = b.cross(c);
+        const double twice_det = 2 * a.dot(bc);
+        const double edge =
+            std::min({aa, bb, cc, (a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()});
+        const double radius = (aa * bc + bb * c.cross(a) + cc * a.cross(b)).squaredNorm();
+        most = std::max(most, radius / (twice_det * twice_det * edge));
+    }
+    return most;
 }
 
 double Star::worth(const Vec3d& x, double floor) {
@@ -134,14 +139,14 @@ void Star::petal_slopes(const Petal& s, const Vec3d& x, double cut, std::vector<
                    ((m[i] + cosine * m[j]) * inverse[j]).cross(side[j]);
         });
         const double at_base = -s.base.dot(m[i]);
-        add(at_base,
-            [&]() -> Vec3d { return -((s.base + at_base * m[i]) * inverse[i]).cross(side[i]); });
+        add(at_base, [&]() -> Vec3d { return -((s.base + at_base * m[i]) * inverse[i]).cross(side[i]); });
     }
 }
 
 /// The d that maximises min_i (value_i + gradient_i·d) − |d|²/2τ: d = τ Σ λ_i gradient_i, with the λ of the
 /// dual found pair by pair. `predicted` is the minimum there.
-Vec3d model_step(const std::vector<Slope>& slopes, double tau, std::vector<double>& lambda, double& predicted) {
+Vec3d model_step(const std::vector<Slope>& slopes, double tau, std::vector<double>& lambda,
+                 double& predicted) {
     const std::size_t n = slopes.size();
     lambda.assign(n, 0);
     std::size_t low = 0;
@@ -219,7 +224,8 @@ std::optional<Vec3d> Mover::place(VertexId v, const Vec3d& from, Vec3d d) const 
 
 void Mover::to_tangent_plane(VertexId v, const Vec3d& x) {
     Vec3d n = Vec3d::Zero();
-    store_.for_fan(v, [&](const Triangle& f) { n += area_vector(x, store_.point(f[1]), store_.point(f[2])); });
+    store_.for_fan(v,
+                   [&](const Triangle& f) { n += area_vector(x, store_.point(f[1]), store_.point(f[2])); });
     const double length = n.norm();
     if (!(length > 0)) return;
     n /= length;
@@ -233,9 +239,11 @@ bool Mover::move(VertexId v, std::uint32_t epoch) {
     star_.gather(v);
     const Vec3d start = store_.point(v);
     Vec3d x = start;
+    const double most_stretched = std::max(longest_radius * longest_radius, star_.radius_edge_squared(x));
     double tau = 0;
     bool moved = false, fresh = true;
-    for (int step = 0, trial = 0; step < max_steps && trial < max_trials && worth < enough * enough; ++trial) {
+    for (int step = 0, trial = 0; step < max_steps && trial < max_trials && worth < enough * enough;
+         ++trial) {
         if (fresh) {
             star_.slopes(x, std::sqrt(worth), slopes_);
             if (slopes_.empty()) break;
@@ -254,7 +262,7 @@ bool Mover::move(VertexId v, std::uint32_t epoch) {
         const std::optional<Vec3d> to = place(v, x, d);
         const double least = worth * (1 + 2 * least_gain);
         const double there = to ? star_.worth(*to, std::max(least, 1e-12)) : 0;
-        fresh = there > least && there > 1e-12 && star_.has_room(*to);
+        fresh = there > least && there > 1e-12 && star_.radius_edge_squared(*to) <= most_stretched;
         if (!fresh) {
             tau *= 0.3;
             continue;

@@ -55,9 +55,11 @@ TEST(MapProjection, LandsOnTheInterpolantAndNearby) {
 
 TEST(MapProjection, StaysOnTheBorderOfTheBox) {
     const Frame frame = centred_frame(21, 1.0);  // from −10 to 10: the ball of radius 12 is cut off
-    const DensityMap map = map_from_function({21, 21, 21}, frame, [](const Vec3d& p) { return 20 - p.norm(); });
+    const DensityMap map =
+        map_from_function({21, 21, 21}, frame, [](const Vec3d& p) { return 20 - p.norm(); });
     const SurfaceProjection project = map_projection(map, 8);
-    // On a wall: stays. Out of the box: back to the wall. A little inside: to the wall, the isosurface is far.
+    // On a wall: stays. Out of the box: back to the wall. A little inside: to the wall, the isosurface is
+    // far.
     EXPECT_EQ(*project(Vec3d(2, 3, 10)), Vec3d(2, 3, 10));
     EXPECT_LT((*project(Vec3d(2, 3, 10.4)) - Vec3d(2, 3, 10)).norm(), 1e-12);
     EXPECT_LT((*project(Vec3d(-10 + 0.3, 1, 2)) - Vec3d(-10, 1, 2)).norm(), 1e-12);
@@ -78,7 +80,8 @@ TEST(MapProjection, WithoutABoxAndWithoutASurface) {
     map.frame.size = Vec3i::Zero();
     EXPECT_TRUE(map_projection(map, 8)(map.frame.to_world(Vec3d(20, 15, 24)) + Vec3d(0, 0, 0)) ==
                 std::nullopt);
-    const DensityMap flat = map_from_function({9, 9, 9}, centred_frame(9, 1.0), [](const Vec3d&) { return 1.0; });
+    const DensityMap flat =
+        map_from_function({9, 9, 9}, centred_frame(9, 1.0), [](const Vec3d&) { return 1.0; });
     EXPECT_FALSE(map_projection(flat, 0.5)(Vec3d(0.2, 0.1, 0.3)));
     EXPECT_FALSE(map_projection(flat, 2)(Vec3d(0.2, 0.1, 0.3)));
     EXPECT_THROW(map_projection(flat, std::nan("")), InvalidInput);

@@ -48,7 +48,8 @@ double volume(const TetMesh& mesh) {
 /// The edge of tetrahedron 0 between vertices 0 and 1.
 std::size_t edge_01(const TetMesh& mesh) {
     for (std::size_t e = 0; e < 6; ++e) {
-        const VertexId a = mesh.tets[0][std::size_t(tet_edges[e][0])], b = mesh.tets[0][std::size_t(tet_edges[e][1])];
+        const VertexId a = mesh.tets[0][std::size_t(tet_edges[e][0])],
+                       b = mesh.tets[0][std::size_t(tet_edges[e][1])];
         if (a + b == 1) return e;
     }
     ADD_FAILURE();
@@ -167,7 +168,8 @@ TEST(TetFlips, EdgesOfFourToSevenGoTheBestWay) {
             TetMesh mesh = ring(n, 5);
             std::mt19937_64 random{std::uint64_t(seed)};
             for (std::size_t v = 2; v < mesh.points.size(); ++v)
-                for (int a = 0; a < 3; ++a) mesh.points[v][a] += 0.15 * (double(random() >> 11) * 0x1p-52 - 1);
+                for (int a = 0; a < 3; ++a)
+                    mesh.points[v][a] += 0.15 * (double(random() >> 11) * 0x1p-52 - 1);
             const TetStore store(mesh, bounds, false);
             const auto flip = edge_removal(store, 0, edge_01(mesh));
             if (n == 8) {
@@ -247,7 +249,8 @@ TEST(TetMoves, NoPlaceOfAFineGridIsMuchBetter) {
         for (int z = -n; z <= n; ++z)
             for (int y = -n; y <= n; ++y)
                 for (int x = -n; x <= n; ++x)
-                    best = std::max(best, star_worth(mesh, Vec3d(0.5 * x / n, 0.5 * y / n, 0.5 * flat * z / n)));
+                    best =
+                        std::max(best, star_worth(mesh, Vec3d(0.5 * x / n, 0.5 * y / n, 0.5 * flat * z / n)));
         TetStore store(mesh, bounds, false);
         std::vector<std::uint32_t> tried(mesh.points.size(), 0);
         std::uint32_t epoch = 0;

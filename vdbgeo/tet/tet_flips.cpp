@@ -192,11 +192,8 @@ std::uint64_t flip_tets(TetStore& store, const std::vector<std::uint32_t>& bad,
                         std::vector<std::uint32_t>& tried, std::uint32_t& epoch) {
     std::vector<std::uint32_t> active;
     tried.resize(store.slot_count(), 0);
-    for (const std::uint32_t t : bad) {
-        const Tetrahedron& tet = store.tet(t);
-        if (std::any_of(tet.begin(), tet.end(), [&](VertexId v) { return store.changed(v) >= tried[t]; }))
-            active.push_back(t);
-    }
+    for (const std::uint32_t t : bad)
+        if (store.changed_around(t) >= tried[t]) active.push_back(t);
     ++epoch;
     std::vector<std::optional<TetFlip>> found(active.size());
     parallel_for(active.size(), 64, [&](std::size_t i) { found[i] = best_flip(store, active[i]); });

@@ -68,6 +68,11 @@ class TetStore {
 
     /// When a tetrahedron around v changed last.
     std::uint32_t changed(VertexId v) const { return changed_[v].load(std::memory_order_relaxed); }
+    /// When a tetrahedron that touches this one changed last.
+    std::uint32_t changed_around(std::uint32_t t) const {
+        const Tetrahedron& c = tets_[t];
+        return std::max({changed(c[0]), changed(c[1]), changed(c[2]), changed(c[3])});
+    }
 
     /// Gives the points and the tetrahedra that are left to `mesh`, in order, without its faces.
     void give_to(TetMesh& mesh);

@@ -17,9 +17,9 @@ namespace vdbgeo::test {
 /// Above 0 inside.
 using Implicit = std::function<double(const Vec3d&)>;
 
-/// Serial isosurface stuffing without grading: the lattice's vertices near the surface are snapped to it, what
-/// it still cuts is cut. Prisms are cut from their vertices with the least numbers, so the angles are worse
-/// than by the published stencils.
+/// Serial isosurface stuffing without grading: the lattice's vertices near the surface are snapped to it,
+/// what it still cuts is cut. Prisms are cut from their vertices with the least numbers, so the angles are
+/// worse than by the published stencils.
 class LatticeTets {
  public:
     /// Cubes of side h in the box from −half to half along each axis.
@@ -43,9 +43,7 @@ class LatticeTets {
     }
 
  private:
-    int id(int kind, int x, int y, int z) const {
-        return ((kind * count_ + z) * count_ + y) * count_ + x;
-    }
+    int id(int kind, int x, int y, int z) const { return ((kind * count_ + z) * count_ + y) * count_ + x; }
 
     /// Four around each axis-parallel edge between two centres, by the sides of the cubes' shared face.
     std::vector<std::array<int, 4>> lattice_tets() const {
@@ -130,8 +128,9 @@ class LatticeTets {
             any = any || value_[std::size_t(v)] > 0;
         }
         if (!any) return;
-        std::stable_sort(in.begin(), in.end(),
-                         [&](int a, int b) { return value_[std::size_t(a)] > 0 && !(value_[std::size_t(b)] > 0); });
+        std::stable_sort(in.begin(), in.end(), [&](int a, int b) {
+            return value_[std::size_t(a)] > 0 && !(value_[std::size_t(b)] > 0);
+        });
         if (out.empty()) add(vertex(t[0]), vertex(t[1]), vertex(t[2]), vertex(t[3]));
         if (out.size() == 1)
             prism({vertex(in[0]), vertex(in[1]), vertex(in[2])},

@@ -104,7 +104,8 @@ class Projection {
         while (near < voxel_) {
             const double far = std::min(near + step, voxel_);
             const double at_far = field_(x + far * direction);
-            if ((at_far > 0) != (value > 0)) return x + root(x, direction, near, at_near, far, at_far) * direction;
+            if ((at_far > 0) != (value > 0))
+                return x + root(x, direction, near, at_near, far, at_far) * direction;
             near = far, at_near = at_far, step *= 2;
         }
         return std::nullopt;

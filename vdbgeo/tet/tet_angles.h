@@ -12,8 +12,8 @@ namespace vdbgeo {
 ///
 ///   q(θ)² with q(θ) = min( sin(θ/2) / sin(low/2), cos(θ/2) / cos(high/2) )
 ///
-/// by its cosine. It is 1 where an angle is on a bound, more between them and 0 at 0° and at 180°; q is nearly
-/// in proportion to an angle that is small, or what lacks one to 180° that is large.
+/// by its cosine. It is 1 where an angle is on a bound, more between them and 0 at 0° and at 180°; q is
+/// nearly in proportion to an angle that is small, or what lacks one to 180° that is large.
 struct DihedralBounds {
     double low_scale, high_scale;
 
@@ -25,10 +25,21 @@ struct DihedralBounds {
     double worth(double least_cosine, double largest_cosine) const {
         return std::min((1 - largest_cosine) * low_scale, (1 + least_cosine) * high_scale);
     }
+
+    /// q of one angle, and how it changes with the cosine.
+    struct Value {
+        double value, slope;
+    };
+    Value value(double cosine) const {
+        const double low = (1 - cosine) * low_scale, high = (1 + cosine) * high_scale;
+        const double q = std::sqrt(std::max(std::min(low, high), 0.0));
+        return {q, (low < high ? -low_scale : high_scale) / (2 * q)};
+    }
 };
 
-/// What the worst dihedral angle of a tetrahedron is worth; 0 for a flat one, −1 for one turned over. By `base`,
-/// the unit normal of the face (p, q, r), counter-clockwise seen from outside, with x the corner opposite.
+/// What the worst dihedral angle of a tetrahedron is worth; 0 for a flat one, −1 for one turned over. By
+/// `base`, the unit normal of the face (p, q, r), counter-clockwise seen from outside, with x the corner
+/// opposite.
 inline double dihedral_worth(const DihedralBounds& bounds, const Vec3d& x, const Vec3d& p, const Vec3d& q,
                              const Vec3d& r, const Vec3d& base) {
     const Vec3d a = p - x, b = q - x, c = r - x;
@@ -53,6 +64,18 @@ inline double dihedral_worth(const DihedralBounds& bounds, const Vec3d& a, const
     const double length = n.norm();
     if (!(length > 0)) return 0;
     return dihedral_worth(bounds, a, b, c, d, n / length);
+}
+
+/// The square of circumradius over shortest edge.
+inline double radius_edge_squared(const Vec3d& x, const Vec3d& p, const Vec3d& q, const Vec3d& r) {
+    const Vec3d a = p - x, b = q - x, c = r - x;
+    const double aa = a.squaredNorm(), bb = b.squaredNorm(), cc = c.squaredNorm();
+    const Vec3d bc = b.cross(c);
+    const double twice_det = 2 * a.dot(bc);
+    const double edge =
+        std::min({aa, bb, cc, (a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()});
+    const double radius = (aa * bc + bb * c.cross(a) + cc * a.cross(b)).squaredNorm();
+    return radius / (twice_det * twice_det * edge);
 }
 
 }  // namespace vdbgeo

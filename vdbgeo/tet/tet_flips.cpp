@@ -14,10 +14,11 @@ constexpr std::size_t most_around = 7;  // tetrahedra around an edge that is tak
 constexpr double least_gain = 2e-3;     // of the worth, relative
 
 /// The other two corners of a tetrahedron with an edge, such that edge and they are in its order.
-constexpr std::array<std::array<std::size_t, 2>, 6> across_edge{{{2, 3}, {3, 1}, {1, 2}, {0, 3}, {2, 0}, {0, 1}}};
+constexpr std::array<std::array<std::size_t, 2>, 6> across_edge{
+    {{2, 3}, {3, 1}, {1, 2}, {0, 3}, {2, 0}, {0, 1}}};
 
-/// What is around an edge: tetrahedra, and the polygon of their other vertices, counter-clockwise seen from the
-/// edge's second end.
+/// What is around an edge: tetrahedra, and the polygon of their other vertices, counter-clockwise seen from
+/// the edge's second end.
 struct Ring {
     VertexId a = 0, b = 0;
     std::size_t count = 0;
@@ -117,8 +118,8 @@ double least_worth(const TetStore& store, const std::vector<std::uint32_t>& tets
 /// What a flip has to be above.
 double floor_of(double before) { return std::max(before * (1 + least_gain), 1e-12); }
 
-/// In a mesh that does not overlap itself fresh tetrahedra that are not turned over are enough. This makes sure
-/// for one that does: no triangle gets a third tetrahedron.
+/// In a mesh that does not overlap itself fresh tetrahedra that are not turned over are enough. This makes
+/// sure for one that does: no triangle gets a third tetrahedron.
 bool conforms(const TetStore& store, const TetFlip& flip) {
     for (const Tetrahedron& fresh : flip.fresh)
         for (const std::array<int, 3>& face : tet_faces) {
@@ -126,7 +127,8 @@ bool conforms(const TetStore& store, const TetFlip& flip) {
             for (std::size_t c = 0; c < 3; ++c) v[c] = fresh[static_cast<std::size_t>(face[c])];
             std::size_t with = 0;
             const auto on_face = [&](const Tetrahedron& t) {
-                return std::all_of(v, v + 3, [&](VertexId w) { return std::find(t.begin(), t.end(), w) != t.end(); });
+                return std::all_of(v, v + 3,
+                                   [&](VertexId w) { return std::find(t.begin(), t.end(), w) != t.end(); });
             };
             for (const std::uint32_t t : store.star(v[0]))
                 if (std::find(flip.old.begin(), flip.old.end(), t) == flip.old.end())
@@ -141,7 +143,8 @@ bool conforms(const TetStore& store, const TetFlip& flip) {
 std::optional<TetFlip> best_flip(const TetStore& store, std::uint32_t tet) {
     std::optional<TetFlip> best;
     const auto keep = [&](std::optional<TetFlip>&& flip) {
-        if (flip && (!best || flip->after - flip->before > best->after - best->before)) best = std::move(flip);
+        if (flip && (!best || flip->after - flip->before > best->after - best->before))
+            best = std::move(flip);
     };
     for (std::size_t e = 0; e < 6; ++e) keep(edge_removal(store, tet, e));
     for (std::size_t k = 0; k < 4; ++k) keep(face_removal(store, tet, k));
@@ -173,8 +176,8 @@ std::optional<TetFlip> face_removal(const TetStore& store, std::uint32_t tet, st
     flip.old = {tet, other};
     flip.before = least_worth(store, flip.old);
     flip.after = std::numeric_limits<double>::infinity();
-    const VertexId beyond =
-        *std::find_if(u.begin(), u.end(), [&](VertexId v) { return std::find(t.begin(), t.end(), v) == t.end(); });
+    const VertexId beyond = *std::find_if(
+        u.begin(), u.end(), [&](VertexId v) { return std::find(t.begin(), t.end(), v) == t.end(); });
     for (std::size_t c = 0; c < 3; ++c) {
         const VertexId p = t[static_cast<std::size_t>(tet_faces[k][c])],
                        q = t[static_cast<std::size_t>(tet_faces[k][(c + 1) % 3])];
@@ -189,11 +192,8 @@ std::uint64_t flip_tets(TetStore& store, const std::vector<std::uint32_t>& bad,
                         std::vector<std::uint32_t>& tried, std::uint32_t& epoch) {
     std::vector<std::uint32_t> active;
     tried.resize(store.slot_count(), 0);
-    for (const std::uint32_t t : bad) {
-        const Tetrahedron& tet = store.tet(t);
-        if (std::any_of(tet.begin(), tet.end(), [&](VertexId v) { return store.changed(v) >= tried[t]; }))
-            active.push_back(t);
-    }
+    for (const std::uint32_t t : bad)
+        if (store.changed_around(t) >= tried[t]) active.push_back(t);
     ++epoch;
     std::vector<std::optional<TetFlip>> found(active.size());
     parallel_for(active.size(), 64, [&](std::size_t i) { found[i] = best_flip(store, active[i]); });
@@ -209,7 +209,8 @@ std::uint64_t flip_tets(TetStore& store, const std::vector<std::uint32_t>& bad,
     std::uint64_t flips = 0;
     for (const std::size_t i : order) {
         const TetFlip& flip = *found[i];
-        if (std::any_of(flip.old.begin(), flip.old.end(), [&](std::uint32_t t) { return touched[t]; })) continue;
+        if (std::any_of(flip.old.begin(), flip.old.end(), [&](std::uint32_t t) { return touched[t]; }))
+            continue;
         if (!conforms(store, flip)) continue;
         for (const std::uint32_t t : flip.old) touched[t] = true;
         store.replace(flip.old, flip.fresh, epoch);

@@ -22,8 +22,8 @@ struct TetFlip {
 /// 7 tetrahedra, and where no triangulation is better than what is there.
 std::optional<TetFlip> edge_removal(const TetStore& store, std::uint32_t tet, std::size_t edge);
 
-/// Takes the face opposite corner k of a tetrahedron away: two tetrahedra become three (2-3 flip). Nothing for
-/// faces on the boundary or between regions, and where that is not better.
+/// Takes the face opposite corner k of a tetrahedron away: two tetrahedra become three (2-3 flip). Nothing
+/// for faces on the boundary or between regions, and where that is not better.
 std::optional<TetFlip> face_removal(const TetStore& store, std::uint32_t tet, std::size_t k);
 
 /// Does the best flip of each of the tetrahedra `bad` that is better than what is there by at least a little:

@@ -7,6 +7,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/tet/tet_flips.h"
 #include "vdbgeo/tet/tet_moves.h"
+#include "vdbgeo/tet/tet_patches.h"
 #include "vdbgeo/tet/tet_store.h"
 
 namespace vdbgeo {
@@ -51,15 +52,17 @@ TetOptimizeReport optimize_tets(TetMesh& mesh, const TetOptimizeOptions& options
     TetOptimizeReport report;
     std::vector<std::uint32_t> bad = store.worse_than(1);
     report.outside_before = report.outside_after = bad.size();
-    std::vector<std::uint32_t> vertices_tried(store.vertex_count(), 0), tets_tried;
+    std::vector<std::uint32_t> vertices_tried(store.vertex_count(), 0), flips_tried, patches_tried;
     std::uint32_t epoch = 0;
     while (report.rounds < options.rounds && !bad.empty()) {
         const Progress part = progress.part(static_cast<double>(report.rounds) / options.rounds,
                                             static_cast<double>(report.rounds + 1) / options.rounds);
         std::uint64_t moves = 0, flips = 0;
-        if (options.flips) flips = flip_tets(store, bad, tets_tried, epoch);
+        if (options.flips) flips = flip_tets(store, bad, flips_tried, epoch);
         moves = move_vertices(store, vertices_of(store, store.worse_than(1), report.rounds % 2 == 1),
                               options.onto_surface, vertices_tried, epoch, part);
+        if (!getenv("NOPATCH"))
+            moves += move_patches(store, store.worse_than(1), options.onto_surface, patches_tried, epoch);
         ++report.rounds;
         report.moves += moves;
         report.flips += flips;

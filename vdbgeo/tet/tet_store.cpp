@@ -83,7 +83,8 @@ void TetStore::set_boundary(const TetMesh& mesh, bool surface_moves) {
                 face[c] = mesh.tets[t][static_cast<std::size_t>(tet_faces[k][c])];
             if (n == TetAdjacency::none) boundary.push_back(face);
             for (const VertexId v : face) {
-                const bool slides = n == TetAdjacency::none && surface_moves && freedom_[v] != VertexFreedom::fixed;
+                const bool slides =
+                    n == TetAdjacency::none && surface_moves && freedom_[v] != VertexFreedom::fixed;
                 freedom_[v] = slides ? VertexFreedom::surface : VertexFreedom::fixed;
             }
         }

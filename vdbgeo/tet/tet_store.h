@@ -1,4 +1,5 @@
-// A tetrahedral mesh while it is optimised: its tetrahedra by vertex, and what each is worth. For tet_optimize.
+// A tetrahedral mesh while it is optimised: its tetrahedra by vertex, and what each is worth. For
+// tet_optimize.
 #pragma once
 
 #include <atomic>
@@ -22,8 +23,8 @@ struct TetSpan {
     std::size_t size() const { return static_cast<std::size_t>(last - first); }
 };
 
-/// Points, tetrahedra, the tetrahedra around each vertex and the boundary's triangles around each vertex of it.
-/// Tetrahedra are replaced in place; the slots of those that went are dead until used again.
+/// Points, tetrahedra, the tetrahedra around each vertex and the boundary's triangles around each vertex of
+/// it. Tetrahedra are replaced in place; the slots of those that went are dead until used again.
 class TetStore {
  public:
     /// Throws InvalidInput for tetrahedra that are turned over, and as tet_adjacency does.
@@ -67,6 +68,11 @@ class TetStore {
 
     /// When a tetrahedron around v changed last.
     std::uint32_t changed(VertexId v) const { return changed_[v].load(std::memory_order_relaxed); }
+    /// When a tetrahedron that touches this one changed last.
+    std::uint32_t changed_around(std::uint32_t t) const {
+        const Tetrahedron& c = tets_[t];
+        return std::max({changed(c[0]), changed(c[1]), changed(c[2]), changed(c[3])});
+    }
 
     /// Gives the points and the tetrahedra that are left to `mesh`, in order, without its faces.
     void give_to(TetMesh& mesh);

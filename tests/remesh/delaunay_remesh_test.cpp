@@ -8,7 +8,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
 #include "vdbgeo/measure/self_intersections.h"
-#include "vdbgeo/remesh/mesh_solid.h"
+#include "vdbgeo/surface/mesh_solid.h"
 #include "vdbgeo/surface/delaunay_surface.h"
 
 namespace vdbgeo {

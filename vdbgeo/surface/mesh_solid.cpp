@@ -1,4 +1,4 @@
-#include "vdbgeo/remesh/mesh_solid.h"
+#include "vdbgeo/surface/mesh_solid.h"
 
 #include <algorithm>
 #include <cmath>

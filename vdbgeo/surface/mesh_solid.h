@@ -1,4 +1,4 @@
-// The solid that a closed mesh encloses, as a function of place. For delaunay_remesh.
+// The solid that a closed mesh encloses, as a function of place. For what meshes it anew.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The surface net of a segmentation: vertices in cells, polygons around grid edges between two labels. For
-// label_surfaces; nothing outside this folder needs it.
+// label_surfaces, and for tetrahedra of labels.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// The trilinear interpolant of a sparse grid at any place, fast. For the surface extractors; nothing outside
-// this folder needs it.
+// The trilinear interpolant of a sparse grid at any place, fast. For what meshes a map as a function of place.
 #pragma once
 
 #include <array>
@@ -28,6 +27,9 @@ class TrilinearField {
 
     double operator()(const Vec3d& index) const;
 
+    /// The sample at a voxel as the grid stores it, outside the box too.
+    double value(const openvdb::Coord& c) const;
+
  private:
     static constexpr int node_dim = 16;  // blocks along an edge of a node
     static constexpr int node_bits = 7;  // of a voxel's place in its node
@@ -39,7 +41,6 @@ class TrilinearField {
     using Corners = std::array<double, 8>;
 
     const Node* find(const openvdb::Coord& c) const;
-    double value(const openvdb::Coord& c) const;
     Corners corners(const openvdb::Coord& c) const;
     static double without_nan(const Corners& d, const Vec3d& t);
 

@@ -5,6 +5,8 @@
 #include "apps/flags.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
+#include "converters/tet_file.h"
+#include "vdbgeo/core/tet_mesh.h"
 #include "vdbgeo/view/png.h"
 
 namespace vdbgeo::app {
@@ -18,6 +20,7 @@ struct RenderCommandOptions {
 };
 
 TriMesh load(const RenderCommandOptions& o, const Isovalue& rule, Session& session) {
+    if (holds_tets(o.in)) return boundary_surface(read_tets(o.in, session.stage("reading")));
     if (is_mesh_input(o.in)) return read_mesh(o.in, session.stage("reading"));
     const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
     for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
@@ -42,21 +45,23 @@ void run_render(const RenderCommandOptions& o, Session& session) {
 }  // namespace
 
 Command render_command() {
-    return {
-        "render", "Draw a mesh, or a map's surface at an isovalue, as a PNG; no display is needed",
-        "  vdbgeo render groel.ply groel.png --view iso", [](CLI::App& app) {
-            auto o = std::make_shared<RenderCommandOptions>();
-            app.add_option("in", o->in, "Mesh (" + mesh_endings_text() + "), map or VDB grid")->required();
-            app.add_option("out", o->out, "Picture to write: .png")->required();
-            add_render_flags(app, o->render);
-            o->iso.add(app);
-            o->map.add_reading(app);
-            return [o](Session& session) {
-                o->map.finish();
-                check_usage(o->render);
-                run_render(*o, session);
-            };
-        }};
+    return {"render", "Draw a mesh, or a map's surface at an isovalue, as a PNG; no display is needed",
+            "  vdbgeo render groel.ply groel.png --view iso", [](CLI::App& app) {
+                auto o = std::make_shared<RenderCommandOptions>();
+                app.add_option("in", o->in,
+                               "Mesh (" + mesh_endings_text() + "), tetrahedral mesh (" + tet_endings_text() +
+                                   "; its boundary), map or VDB grid")
+                    ->required();
+                app.add_option("out", o->out, "Picture to write: .png")->required();
+                add_render_flags(app, o->render);
+                o->iso.add(app);
+                o->map.add_reading(app);
+                return [o](Session& session) {
+                    o->map.finish();
+                    check_usage(o->render);
+                    run_render(*o, session);
+                };
+            }};
 }
 
 }  // namespace vdbgeo::app

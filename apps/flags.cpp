@@ -217,8 +217,11 @@ void add_vdb_flags(CLI::App& app, VdbWriteOptions& options) {
 void add_render_flags(CLI::App& app, RenderOptions& options) {
     app.add_option("--width", options.width, "Width of the picture in pixels")->capture_default_str();
     app.add_option("--height", options.height, "Height of the picture in pixels [what the views need]");
-    app.add_option("--view", options.view, "three, front, side, top or iso")->capture_default_str();
-    app.add_option("--color-by", options.property, "Vertex property to colour by [plain colour]");
+    app.add_option("--view", options.view,
+                   "three, front, side, top, iso, or x,y,z: the direction towards the viewer")
+        ->capture_default_str();
+    app.add_option("--color-by", options.property,
+                   "Property of the vertices or faces to colour by [plain colour]");
     app.add_option("--color-label", options.label,
                    "Text under the colour scale, with its unit [the property's name]");
     app.add_option("--color-map", options.colormap, "sequential, diverging or categorical [by the range]");
@@ -226,6 +229,7 @@ void add_render_flags(CLI::App& app, RenderOptions& options) {
                    "Value of the first colour, in the property's unit [2nd percentile]");
     app.add_option("--max", options.range_max,
                    "Value of the last colour, in the property's unit [98th percentile]");
+    app.add_flag("--edges", options.edges, "Draw the edges of the faces");
     app.add_option("--samples", options.samples, "Rays a pixel: 1, 4, 9 or 16")->capture_default_str();
     app.add_option("--occlusion", options.occlusion_rays, "Rays of ambient occlusion each, 0 to 1024")
         ->capture_default_str();

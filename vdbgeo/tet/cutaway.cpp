@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/hidden_edges.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/core/tet_adjacency.h"
 #include "vdbgeo/measure/triangle_tree.h"
@@ -30,6 +31,7 @@ struct Face {
     std::array<Corner, 3> corners;
     std::uint32_t tet;
     bool interior;
+    int hidden_edges = 0;  ///< as hidden_edges_property has them
 };
 using Faces = std::vector<Face>;
 
@@ -186,8 +188,11 @@ class FlatCut {
         if (polygon.size() == 4 && (point(polygon[1]) - point(polygon[3])).squaredNorm() <
                                        (point(polygon[0]) - point(polygon[2])).squaredNorm())
             std::rotate(polygon.begin(), polygon.begin() + 1, polygon.end());
+        // The diagonal of a quadrilateral is opposite to corner 1 of its first triangle, 2 of the other.
+        const bool quad = polygon.size() == 4;
         for (std::size_t i = 2; i < polygon.size(); ++i)
-            faces.push_back({{polygon[0], polygon[i - 1], polygon[i]}, tet, interior});
+            faces.push_back(
+                {{polygon[0], polygon[i - 1], polygon[i]}, tet, interior, quad ? i == 2 ? 2 : 4 : 0});
     }
 
     const TetMesh& mesh_;
@@ -303,6 +308,11 @@ void set_properties(const TetMesh& mesh, const Faces& faces, TriMesh& out) {
         out.face_properties.push_back({names[i], 1, std::move(of_faces[i])});
         out.vertex_properties.push_back({names[i], 1, std::move(of_vertices[i])});
     }
+    const auto hides = [](const Face& f) { return f.hidden_edges != 0; };
+    if (std::none_of(faces.begin(), faces.end(), hides)) return;
+    MeshProperty hidden{hidden_edges_property, 1, {}};
+    for (const Face& f : faces) hidden.values.push_back(static_cast<float>(f.hidden_edges));
+    out.face_properties.push_back(std::move(hidden));
 }
 
 }  // namespace

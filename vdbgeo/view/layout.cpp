@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 
@@ -20,10 +21,28 @@ constexpr double title_height = 2.2, caption_height = 3.2, footer_height = 4.4, 
 View front() { return {"front", Vec3d::UnitX(), Vec3d::UnitZ(), -Vec3d::UnitY()}; }
 View side() { return {"side", Vec3d::UnitY(), Vec3d::UnitZ(), Vec3d::UnitX()}; }
 View top() { return {"top", Vec3d::UnitX(), Vec3d::UnitY(), Vec3d::UnitZ()}; }
-View iso() {
-    const Vec3d towards = Vec3d(0.55, -0.75, 0.55).normalized();
-    const Vec3d right = Vec3d::UnitZ().cross(towards).normalized();
-    return {"iso", right, towards.cross(right), towards};
+
+/// From a place in this direction; z is up, or y where that cannot be.
+View seen_from(const std::string& name, const Vec3d& direction) {
+    const Vec3d towards = direction.normalized();
+    const Vec3d up = towards.head<2>().norm() > 1e-3 ? Vec3d::UnitZ() : Vec3d::UnitY();
+    const Vec3d right = up.cross(towards).normalized();
+    return {name, right, towards.cross(right), towards};
+}
+
+View iso() { return seen_from("iso", {0.55, -0.75, 0.55}); }
+
+/// "x,y,z" as a direction, if it is one.
+std::optional<Vec3d> parse_direction(const std::string& text) {
+    Vec3d v;
+    const char *at = text.data(), *end = at + text.size();
+    for (int i = 0; i < 3; ++i) {
+        const auto [rest, error] = std::from_chars(at, end, v[i]);
+        if (error != std::errc() || (i < 2 ? rest == end || *rest != ',' : rest != end)) return {};
+        at = rest + (i < 2);
+    }
+    if (!v.allFinite() || !(v.norm() > 1e-100 && v.norm() < 1e100)) return {};
+    return v;
 }
 
 Vec3f ink(const RenderOptions& options) {
@@ -59,7 +78,7 @@ void draw_arrow(Image& image, const Vec2d& from, const Vec2d& to, double text, c
 void draw_caption(Image& image, const Panel& panel, const Layout& layout, const Vec3f& colour) {
     const double em = layout.text, arrow = 1.35 * em;
     const Vec2d corner(panel.x + 0.5 * em, layout.caption_top + 2.75 * em);
-    const bool slanted = panel.view.name == "iso";
+    const bool slanted = panel.view.towards.cwiseAbs().maxCoeff() < 0.999;
     const Vec2d origin = slanted ? Vec2d(corner.x() + 0.9 * em, corner.y() - 0.9 * em) : corner;
     for (int axis = 0; axis < 3; ++axis) {
         const Vec2d direction(panel.view.right[axis], -panel.view.up[axis]);
@@ -129,7 +148,9 @@ std::vector<View> find_views(const std::string& name) {
     if (name == "three") return {front(), side(), top()};
     for (const View& view : {front(), side(), top(), iso()})
         if (view.name == name) return {view};
-    throw InvalidInput(fmt::format("view '{}' is not one of three, front, side, top, iso", name));
+    if (const auto direction = parse_direction(name)) return {seen_from("from " + name, *direction)};
+    throw InvalidInput(
+        fmt::format("view '{}' is not one of three, front, side, top, iso, nor a direction x,y,z", name));
 }
 
 Layout arrange(const std::vector<View>& views, const std::vector<ViewBox>& boxes,

@@ -10,11 +10,10 @@
 #include <limits>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/hidden_edges.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/view/layout.h"
-#ifdef VDBGEO_HAS_EMBREE
-#include <embree3/rtcore.h>
-#endif
+#include "vdbgeo/view/ray_caster.h"
 
 namespace vdbgeo {
 
@@ -137,94 +136,6 @@ ViewBox box_in_view(const Model& model, const View& view) {
         });
 }
 
-/// Embree's device and scene over a model's arrays.
-class RayCaster {
- public:
-    explicit RayCaster(const Model& model) : device_(rtcNewDevice(nullptr)) {
-        if (!device_) throw NumericalError("the ray caster (embree) could not be started");
-        scene_ = rtcNewScene(device_);
-        rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-        RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        // Embree reads 16 bytes at each point: its own, padded buffer has them.
-        void* points = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                               sizeof(Vec3f), model.points.size());
-        void* faces = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              sizeof(Triangle), model.triangles->size());
-        if (points && faces) {
-            std::copy(model.points.begin(), model.points.end(), static_cast<Vec3f*>(points));
-            std::copy(model.triangles->begin(), model.triangles->end(), static_cast<Triangle*>(faces));
-            rtcCommitGeometry(geometry);
-            rtcAttachGeometry(scene_, geometry);
-            rtcCommitScene(scene_);
-        }
-        rtcReleaseGeometry(geometry);
-        const RTCError error = rtcGetDeviceError(device_);
-        if (error != RTC_ERROR_NONE) {
-            release();
-            throw NumericalError(fmt::format("the ray caster (embree) failed on {} faces, error {}",
-                                             model.triangles->size(), static_cast<int>(error)));
-        }
-    }
-    ~RayCaster() { release(); }
-    RayCaster(const RayCaster&) = delete;
-    RayCaster& operator=(const RayCaster&) = delete;
-
-    struct Hit {
-        std::uint32_t face;
-        float distance, u, v;
-    };
-
-    std::optional<Hit> first(const Vec3f& origin, const Vec3f& direction) const {
-        RTCRayHit query{};
-        set(query.ray, origin, direction, std::numeric_limits<float>::infinity());
-        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        rtcIntersect1(scene_, &context, &query);
-        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-        return Hit{query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
-    }
-
-    static constexpr int packet = 8;
-
-    /// For each of `count` ≤ packet rays from one point, whether it meets something before its length.
-    std::array<bool, packet> blocked(const Vec3f& origin, const Vec3f* directions, const float* lengths,
-                                     int count) const {
-        RTCRay8 rays{};
-        alignas(32) int valid[packet];
-        for (int i = 0; i < packet; ++i) {
-            const int k = std::min(i, count - 1);
-            valid[i] = i < count ? -1 : 0;
-            rays.org_x[i] = origin.x(), rays.org_y[i] = origin.y(), rays.org_z[i] = origin.z();
-            rays.dir_x[i] = directions[k].x(), rays.dir_y[i] = directions[k].y(),
-            rays.dir_z[i] = directions[k].z();
-            rays.tfar[i] = lengths[k];
-            rays.mask[i] = ~0u;
-        }
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        rtcOccluded8(valid, scene_, &context, &rays);
-        std::array<bool, packet> result{};
-        for (int i = 0; i < count; ++i) result[static_cast<std::size_t>(i)] = rays.tfar[i] < 0;
-        return result;
-    }
-
- private:
-    static void set(RTCRay& ray, const Vec3f& origin, const Vec3f& direction, float length) {
-        ray.org_x = origin.x(), ray.org_y = origin.y(), ray.org_z = origin.z();
-        ray.dir_x = direction.x(), ray.dir_y = direction.y(), ray.dir_z = direction.z();
-        ray.tfar = length;
-        ray.mask = ~0u;
-    }
-    void release() {
-        rtcReleaseScene(scene_);
-        rtcReleaseDevice(device_);
-    }
-
-    RTCDevice device_;
-    RTCScene scene_ = nullptr;
-};
-
 /// What one primary ray found. Directions are in camera axes: right, up, towards the viewer.
 struct Sample {
     bool hit = false, inside = false;
@@ -266,7 +177,9 @@ struct Scene {
     const RayCaster& rays;
     const RenderOptions& options;
     const MeshProperty* property;
+    bool of_faces;  // the property
     const std::optional<ColourScale>& scale;
+    const MeshProperty* hidden_edges;
     int grid;  // samples along a pixel's side
 };
 
@@ -278,13 +191,45 @@ struct Camera {
 };
 
 Vec3f base_colour(const Scene& scene, const RayCaster::Hit& hit, const Triangle& t, bool inside) {
-    if (!scene.property) return linear(inside ? scene.options.inside : scene.options.surface);
+    const Vec3f plain = linear(inside ? scene.options.inside : scene.options.surface);
+    if (!scene.property) return plain;
     const auto& values = scene.property->values;
     const float w = 1 - hit.u - hit.v;
-    double value = w * values[t[0]] + hit.u * values[t[1]] + hit.v * values[t[2]];
-    if (scene.scale->map.categories() > 0)
+    double value = 0;
+    if (scene.of_faces) {
+        value = values[hit.face];
+        if (std::isnan(value)) return plain;
+    } else if (scene.scale->map.categories() > 0) {
         value = values[w >= hit.u && w >= hit.v ? t[0] : hit.u >= hit.v ? t[1] : t[2]];
+    } else {
+        value = w * values[t[0]] + hit.u * values[t[1]] + hit.v * values[t[2]];
+    }
     return linear(scene.scale->colour(value)) * (inside ? 0.35f : 1.0f);
+}
+
+/// How much of the light an edge of the face takes at a point of it: lines about a pixel wide, by the
+/// distance to the edges in the picture. Faces of a few pixels and those seen edge-on have fainter lines:
+/// they would be nothing else.
+float edge_ink(const Scene& scene, const Camera& camera, const RayCaster::Hit& hit, const Triangle& t) {
+    constexpr float most = 0.8f, half_width = 0.5f;  // pixels
+    const float pixel = camera.step * static_cast<float>(scene.grid);
+    std::array<Eigen::Vector2f, 3> p;
+    for (std::size_t k = 0; k < 3; ++k)
+        p[k] = (camera.axes.transpose() * scene.model.points[t[k]]).head<2>() / pixel;
+    const Eigen::Vector2f ab = p[1] - p[0], ac = p[2] - p[0];
+    const float area = std::abs(ab.x() * ac.y() - ab.y() * ac.x());  // twice, pixels²
+    const std::array<float, 3> length{(p[2] - p[1]).norm(), ac.norm(), ab.norm()};
+    const float around = length[0] + length[1] + length[2];
+    if (!(area > 0)) return 0;
+    const float inner_radius = area / around;
+    const float strength = most * std::clamp((inner_radius - 0.5f) / 3.0f, 0.0f, 1.0f);
+    const unsigned hidden =
+        scene.hidden_edges ? static_cast<unsigned>(scene.hidden_edges->values[hit.face]) : 0;
+    const std::array<float, 3> weight{1 - hit.u - hit.v, hit.u, hit.v};
+    float nearest = std::numeric_limits<float>::infinity();
+    for (unsigned k = 0; k < 3; ++k)
+        if (!(hidden >> k & 1u)) nearest = std::min(nearest, weight[k] * area / length[k]);
+    return strength * std::clamp(half_width + 0.5f - nearest, 0.0f, 1.0f);
 }
 
 /// Rays from one point, cast when a packet is full. Each adds 1 to a counter where nothing blocks it.
@@ -391,6 +336,7 @@ Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
     normal.z() = std::max(normal.z(), 0.0f);
     sample.normal = normal.norm() > 1e-6f ? Vec3f(normal.normalized()) : face_normal;
     sample.base = base_colour(scene, *hit, t, sample.inside);
+    if (scene.options.edges) sample.base *= 1 - edge_ink(scene, camera, *hit, t);
     const float weights[3] = {w, hit->u, hit->v};
     const Vec3f point = w * p[t[0]] + hit->u * p[t[1]] + hit->v * p[t[2]];
     sample.depth = point.dot(towards);
@@ -525,17 +471,28 @@ void draw_panel(Image& image, const Scene& scene, const Layout& layout, const Pa
     });
 }
 
+/// The property to colour by, of the vertices or else of the faces.
 const MeshProperty* find_property(const TriMesh& mesh, const RenderOptions& options) {
     if (!options.property) return nullptr;
     const MeshProperty* found = mesh.find_vertex_property(*options.property);
+    if (!found) found = mesh.find_face_property(*options.property);
     if (found && found->components == 1) return found;
     if (found)
-        throw InvalidInput(fmt::format("vertex property '{}' has {} components: colours need a scalar",
-                                       found->name, found->components));
+        throw InvalidInput(fmt::format("property '{}' has {} components: colours need a scalar", found->name,
+                                       found->components));
     std::string names;
-    for (const MeshProperty& p : mesh.vertex_properties) names += (names.empty() ? "" : ", ") + p.name;
-    throw InvalidInput(fmt::format("the mesh has no vertex property '{}'; it has {}", *options.property,
+    for (const auto* properties : {&mesh.vertex_properties, &mesh.face_properties})
+        for (const MeshProperty& p : *properties) names += (names.empty() ? "" : ", ") + p.name;
+    throw InvalidInput(fmt::format("the mesh has no property '{}'; it has {}", *options.property,
                                    names.empty() ? "none" : names));
+}
+
+/// The faces' flags, where they are flags.
+const MeshProperty* find_hidden_edges(const TriMesh& mesh, const RenderOptions& options) {
+    const MeshProperty* found = options.edges ? mesh.find_face_property(hidden_edges_property) : nullptr;
+    if (!found || found->components != 1) return nullptr;
+    const auto flags = [](float v) { return v >= 0 && v <= 7; };
+    return std::all_of(found->values.begin(), found->values.end(), flags) ? found : nullptr;
 }
 
 }  // namespace
@@ -558,9 +515,11 @@ Image render(const TriMesh& mesh, const RenderOptions& options, const Progress& 
     Image image(layout.width, layout.height, options.background);
 
     progress.report(0);
-    const RayCaster rays(model);
+    const RayCaster rays(model.points, mesh.triangles);
     const int grid = static_cast<int>(std::lround(std::sqrt(options.samples)));
-    const Scene scene{model, rays, options, property, scale, grid};
+    const bool of_faces = property && !mesh.find_vertex_property(*options.property);
+    const Scene scene{model, rays, options, property, of_faces, scale, find_hidden_edges(mesh, options),
+                      grid};
     for (std::size_t i = 0; i < views.size(); ++i) {
         const double n = static_cast<double>(views.size()), k = static_cast<double>(i);
         draw_panel(image, scene, layout, layout.panels[i], boxes[i], progress.part(k / n, (k + 1) / n));

@@ -15,10 +15,13 @@ struct RenderOptions {
     std::optional<int> height;  ///< pixels; unset: what the views need at this width, at most the width
     /// "front" (seen along +y: x to the right, z up), "side" (seen along −x: y right, z up), "top" (seen
     /// along −z: x right, y up), "iso" (from the front, right and above), or "three": front, side and top
-    /// beside each other at one scale.
+    /// beside each other at one scale; or three numbers "x,y,z": the direction towards the viewer, z up in
+    /// the picture (y where it looks along z).
     std::string view = "three";
 
-    std::optional<std::string> property;  ///< scalar vertex property to colour by; unset: one plain colour
+    /// Scalar property to colour by: of the vertices, blended over the faces, or else of the faces, each in
+    /// one colour. Unset: one plain colour.
+    std::optional<std::string> property;
     std::optional<std::string> label;  ///< under the colour scale, with its unit; unset: the property's name
     std::optional<double> range_min;   ///< value of the first colour; unset: 2nd percentile of the property
     std::optional<double> range_max;   ///< value of the last colour; unset: 98th percentile
@@ -31,6 +34,10 @@ struct RenderOptions {
     int occlusion_rays = 6;  ///< rays of ambient occlusion for each of them, 0 (none)…1024
     bool shadows = true;     ///< soft shadow of the key light
     bool outline = true;  ///< dark lines where the surface hides a farther part of itself or the background
+
+    /// Thin dark lines along the edges of the faces, but for those that the face property
+    /// hidden_edges_property (core/hidden_edges.h) flags. Where faces have but a few pixels the lines fade.
+    bool edges = false;
 
     Vec3f surface{0.47f, 0.67f, 0.85f};  ///< sRGB, outside of the surface where no property colours it
     Vec3f inside{0.86f, 0.62f, 0.36f};  ///< sRGB, inside: seen through a hole, or where faces are turned over
@@ -63,9 +70,9 @@ bool can_render();
 /// keep the mesh's corners.
 ///
 /// Any triangle mesh will do: open, non-manifold, with zero-area faces; points no face uses are ignored. A
-/// back face shows in the colour `inside`, or in the darkened colour of its property. NaN property values are
-/// grey. The mesh is centred and scaled in double precision first: neither its size nor its distance from the
-/// origin matters beyond the precision of its float coordinates.
+/// back face shows in the colour `inside`, or in the darkened colour of its property. NaN is grey for
+/// vertices; faces with NaN have the plain colour. The mesh is centred and scaled in double precision first:
+/// neither its size nor its distance from the origin matters beyond the precision of its float coordinates.
 ///
 /// Same mesh and options → same bytes, for any number of threads.
 ///

@@ -119,10 +119,11 @@ int steiner_points_allowed(const TetgenOptions& options) {
 }
 
 tetgenbehavior switches(const TetgenOptions& options) {
-    // Facets are triangles and stay apart (M), or TetGen flattens what bends by less than a tenth of a
-    // degree.
-    std::string text = fmt::format("pqAMQS{}", steiner_points_allowed(options));
-    if (options.keep_surface) text += 'Y';
+    // Triangles that lie in a plane to a tenth of a degree are one facet for TetGen, which may swap their
+    // edges; M keeps them apart. Where the surface may change that is not wanted: TetGen protects all edges
+    // of facets, by many small tetrahedra where they meet at acute angles.
+    std::string text =
+        fmt::format("pqAQS{}{}", steiner_points_allowed(options), options.keep_surface ? "MY" : "");
     if (options.max_volume_A3) text += "a1";
     tetgenbehavior behavior;
     if (!behavior.parse_commandline(text.data())) throw NumericalError("it does not understand its switches");

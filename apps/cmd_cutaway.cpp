@@ -4,8 +4,9 @@
 namespace vdbgeo::app {
 
 Command cutaway_command() {
-    return {"cutaway", "not there yet", "",
-            [](CLI::App&) { return [](Session&) { throw NumericalError("not there yet"); }; }};
+    return {"cutaway", "not there yet", "", [](CLI::App&) {
+                return [](Session&) { throw NumericalError("not there yet"); };
+            }};
 }
 
 }  // namespace vdbgeo::app

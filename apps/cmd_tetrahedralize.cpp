@@ -4,8 +4,9 @@
 namespace vdbgeo::app {
 
 Command tetrahedralize_command() {
-    return {"tetrahedralize", "not there yet", "",
-            [](CLI::App&) { return [](Session&) { throw NumericalError("not there yet"); }; }};
+    return {"tetrahedralize", "not there yet", "", [](CLI::App&) {
+                return [](Session&) { throw NumericalError("not there yet"); };
+            }};
 }
 
 }  // namespace vdbgeo::app

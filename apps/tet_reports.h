@@ -9,8 +9,8 @@
 
 namespace vdbgeo::app {
 
-/// vertices, tets, volume_A3, min_dihedral_deg, max_dihedral_deg, radius_edge_max, radius_edge_mean, slivers,
-/// and more.
+/// vertices, tets, volume_A3, min_dihedral_deg, max_dihedral_deg, radius_edge_max, radius_edge_mean, slivers, and
+/// more.
 Json tets_json(const TetQuality& quality);
 std::vector<std::string> tets_text(const TetQuality& quality);
 

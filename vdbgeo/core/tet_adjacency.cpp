@@ -39,8 +39,8 @@ Key key_of(const Tetrahedron& t, std::uint32_t half_face, VertexId& low) {
 
 TetAdjacency tet_adjacency(const TetMesh& mesh) {
     if (mesh.tets.size() >= (std::size_t{1} << 30))
-        throw InvalidInput(
-            fmt::format("{} tetrahedra, more than the 2^30-1 whose faces can be paired", mesh.tets.size()));
+        throw InvalidInput(fmt::format("{} tetrahedra, more than the 2^30-1 whose faces can be paired",
+                                       mesh.tets.size()));
     const std::uint32_t count = static_cast<std::uint32_t>(4 * mesh.tets.size());
     Array<std::uint32_t> start(mesh.points.size() + 1), order(count);
     std::fill(start.begin(), start.end(), 0u);
@@ -55,9 +55,7 @@ TetAdjacency tet_adjacency(const TetMesh& mesh) {
         std::sort(v.begin(), v.end());
         if (v[0] == v[1] || v[1] == v[2] || v[2] == v[3])
             throw InvalidInput(fmt::format("tetrahedron {} names vertex {} twice", t,
-                                           v[0] == v[1]   ? v[0]
-                                           : v[2] == v[1] ? v[1]
-                                                          : v[2]));
+                                           v[0] == v[1] ? v[0] : v[2] == v[1] ? v[1] : v[2]));
     }
     for (std::uint32_t h = 0; h < count; ++h) ++start[low_of(h) + std::size_t{1}];
     for (std::size_t v = 0; v < mesh.points.size(); ++v) start[v + 1] += start[v];
@@ -80,12 +78,11 @@ TetAdjacency tet_adjacency(const TetMesh& mesh) {
             for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
                 const Key &a = keys[i], &b = keys[i + 1];
                 if (a.middle != b.middle || a.high != b.high) continue;
-                const bool third =
-                    i + 2 < keys.size() && keys[i + 2].middle == a.middle && keys[i + 2].high == a.high;
+                const bool third = i + 2 < keys.size() && keys[i + 2].middle == a.middle && keys[i + 2].high == a.high;
                 if (third || a.even == b.even)
-                    throw InvalidInput(
-                        fmt::format("the triangle of vertices {}, {}, {} has {}", v, a.middle, a.high,
-                                    third ? "more than two tetrahedra" : "two tetrahedra on the same side"));
+                    throw InvalidInput(fmt::format(
+                        "the triangle of vertices {}, {}, {} has {}", v, a.middle, a.high,
+                        third ? "more than two tetrahedra" : "two tetrahedra on the same side"));
                 out.neighbour[a.half_face / 4][a.half_face % 4] = b.half_face / 4;
                 out.neighbour[b.half_face / 4][b.half_face % 4] = a.half_face / 4;
                 ++i;

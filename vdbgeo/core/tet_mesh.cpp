@@ -58,11 +58,11 @@ void check(const TetMesh& mesh, const std::string& what) {
             fmt::format("{}: {} regions for {} tetrahedra", what, mesh.regions.size(), mesh.tets.size()));
     for (std::size_t t = 0; t < mesh.regions.size(); ++t)
         if (mesh.regions[t] < 1)
-            throw InvalidInput(fmt::format("{}: tetrahedron {} is in region {}; regions count from 1", what,
-                                           t, mesh.regions[t]));
+            throw InvalidInput(fmt::format("{}: tetrahedron {} is in region {}; regions count from 1", what, t,
+                                           mesh.regions[t]));
     if (mesh.face_regions.size() != mesh.faces.size())
-        throw InvalidInput(fmt::format("{}: {} pairs of regions for {} faces", what, mesh.face_regions.size(),
-                                       mesh.faces.size()));
+        throw InvalidInput(fmt::format("{}: {} pairs of regions for {} faces", what,
+                                       mesh.face_regions.size(), mesh.faces.size()));
     check_sizes(mesh.vertex_properties, mesh.points.size(), what);
     check_sizes(mesh.tet_properties, mesh.tets.size(), what);
 }

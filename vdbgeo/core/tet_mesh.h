@@ -19,8 +19,7 @@ using Tetrahedron = std::array<VertexId, 4>;
 inline constexpr std::array<std::array<int, 3>, 4> tet_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 /// The corners at the ends of each of the six edges.
-inline constexpr std::array<std::array<int, 2>, 6> tet_edges{
-    {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
+inline constexpr std::array<std::array<int, 2>, 6> tet_edges{{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
 
 /// Tetrahedra over shared points, in Å. Points are doubles: what is computed in doubles is not turned over by
 /// rounding, and the points of a TriMesh are kept as they are.
@@ -49,8 +48,8 @@ struct TetMesh {
 
 /// Throws InvalidInput unless every tetrahedron and face names existing points, every coordinate is finite,
 /// there are as many regions (1 or more each) as tetrahedra or none, as many pairs of regions as faces, and
-/// every property has as many values as the mesh has elements. `what` begins the message (a file's name,
-/// say). Turned-over tetrahedra are let through: they are measured (tet_quality.h).
+/// every property has as many values as the mesh has elements. `what` begins the message (a file's name, say).
+/// Turned-over tetrahedra are let through: they are measured (tet_quality.h).
 void check(const TetMesh& mesh, const std::string& what);
 
 /// Six times the signed volume of a tetrahedron: det(b − a, c − a, d − a).
@@ -62,13 +61,13 @@ inline double tet_determinant(const TetMesh& mesh, std::size_t tet) {
     return tet_determinant(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], mesh.points[t[3]]);
 }
 
-/// Sets `faces` and `face_regions` from the tetrahedra and their regions. Throws InvalidInput where a
-/// triangle has more than two tetrahedra, or two on the same side. Cost: that of tet_adjacency.
+/// Sets `faces` and `face_regions` from the tetrahedra and their regions. Throws InvalidInput where a triangle
+/// has more than two tetrahedra, or two on the same side. Cost: that of tet_adjacency.
 void set_faces(TetMesh& mesh);
 
-/// The boundary of the mesh as a triangle mesh of its own (faces whose outside is 0), vertices in the order
-/// of the mesh and rounded to floats; with `region`: the whole boundary of that region, turned outward from
-/// it. The face property `region` tells the region behind each face. Needs faces.
+/// The boundary of the mesh as a triangle mesh of its own (faces whose outside is 0), vertices in the order of
+/// the mesh and rounded to floats; with `region`: the whole boundary of that region, turned outward from it.
+/// The face property `region` tells the region behind each face. Needs faces.
 TriMesh boundary_surface(const TetMesh& mesh, std::int32_t region = 0);
 
 }  // namespace vdbgeo

@@ -5,8 +5,6 @@
 namespace vdbgeo {
 
 void CutawayOptions::check() const {}
-TriMesh cutaway(const TetMesh&, const CutawayOptions&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+TriMesh cutaway(const TetMesh&, const CutawayOptions&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

@@ -13,7 +13,7 @@ namespace vdbgeo {
 /// What is taken away. Exactly one of `plane` and `peel` is set.
 struct CutawayOptions {
     struct Plane {
-        Vec3d point = Vec3d::Zero();    ///< Å
+        Vec3d point = Vec3d::Zero();   ///< Å
         Vec3d normal = Vec3d::UnitY();  ///< points to what goes; any length above 0
         /// Whole tetrahedra go whose centroid is beyond the plane (the view of Fig 15); else those that the
         /// plane goes through are cut, and the cut is flat.
@@ -39,9 +39,9 @@ struct CutawayOptions {
 /// faces that were cut open, so that a picture can be coloured by them, and on the old boundary NaN.
 ///
 /// A peel goes breadth first from the tetrahedron behind the seed face, through faces, neighbours by their
-/// number (§3.4, Fig 16); it stops early where a component ends. Throws InvalidInput for options out of
-/// range, a mesh without tetrahedra and a seed face that is not on the boundary; NumericalError where nothing
-/// is left. Cost: that of tet_adjacency.
+/// number (§3.4, Fig 16); it stops early where a component ends. Throws InvalidInput for options out of range,
+/// a mesh without tetrahedra and a seed face that is not on the boundary; NumericalError where nothing is
+/// left. Cost: that of tet_adjacency.
 TriMesh cutaway(const TetMesh& mesh, const CutawayOptions& options, const Progress& progress = {});
 
 }  // namespace vdbgeo

@@ -4,9 +4,6 @@
 
 namespace vdbgeo {
 
-std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()>&, const IsolationLimits&,
-                                    const std::string&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()>&, const IsolationLimits&, const std::string&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

@@ -15,8 +15,8 @@ struct IsolationLimits {
     std::uint64_t max_bytes = 0;  ///< of memory beyond what the process has; 0: no limit
 };
 
-/// The bytes that `work` gives, computed in a child process of its own (fork), whose standard output and
-/// error go nowhere. `work` must not use threads, nor anything that other threads of this process may hold.
+/// The bytes that `work` gives, computed in a child process of its own (fork), whose standard output and error
+/// go nowhere. `work` must not use threads, nor anything that other threads of this process may hold.
 /// Asks `progress` ten times a second whether to go on.
 ///
 /// Throws NumericalError, beginning with `what`, where the child was killed by a signal (naming it: "crashed

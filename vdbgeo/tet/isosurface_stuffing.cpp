@@ -5,8 +5,6 @@
 namespace vdbgeo {
 
 void StuffingOptions::check() const {}
-TetMesh isosurface_stuffing(const DensityMap&, double, const StuffingOptions&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+TetMesh isosurface_stuffing(const DensityMap&, double, const StuffingOptions&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

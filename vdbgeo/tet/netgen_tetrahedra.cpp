@@ -6,8 +6,6 @@ namespace vdbgeo {
 
 void NetgenOptions::check() const {}
 bool have_netgen() { return false; }
-TetMesh netgen_tetrahedra(const TriMesh&, const NetgenOptions&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+TetMesh netgen_tetrahedra(const TriMesh&, const NetgenOptions&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

@@ -25,8 +25,8 @@ struct NetgenOptions {
 bool have_netgen();
 
 /// Fills the solids that `surface` bounds (see solid_input.h) by NetGen (Schöberl 1997,
-/// doi:10.1007/s007910050004). The surface's points and faces are in the mesh, points first and in their
-/// order. Each solid is filled by a process of its own (isolated.h), as many at once as there are threads.
+/// doi:10.1007/s007910050004). The surface's points and faces are in the mesh, points first and in their order.
+/// Each solid is filled by a process of its own (isolated.h), as many at once as there are threads.
 ///
 /// The same bytes in each run. Cost: some 0.1 ms a tetrahedron. Throws as tetgen_tetrahedra does.
 TetMesh netgen_tetrahedra(const TriMesh& surface, const NetgenOptions& options = {},

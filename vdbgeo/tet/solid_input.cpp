@@ -4,8 +4,6 @@
 
 namespace vdbgeo {
 
-SolidInput solid_input(const TriMesh&, const std::string&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+SolidInput solid_input(const TriMesh&, const std::string&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

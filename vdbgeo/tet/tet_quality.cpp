@@ -4,9 +4,7 @@
 
 namespace vdbgeo {
 
-TetShape tet_shape(const Vec3d&, const Vec3d&, const Vec3d&, const Vec3d&) {
-    throw NumericalError("not there yet");
-}
+TetShape tet_shape(const Vec3d&, const Vec3d&, const Vec3d&, const Vec3d&) { throw NumericalError("not there yet"); }
 TetQuality measure_tets(const TetMesh&, const Progress&) { throw NumericalError("not there yet"); }
 void set_quality_properties(TetMesh&) { throw NumericalError("not there yet"); }
 

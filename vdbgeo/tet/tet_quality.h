@@ -12,8 +12,8 @@ namespace vdbgeo {
 
 /// The numbers of one tetrahedron. A flat or turned-over one has volume ≤ 0, and angles as its faces lie.
 struct TetShape {
-    double volume = 0;                     ///< signed, Å³
-    std::array<double, 6> dihedral_deg{};  ///< at the edges of tet_edges
+    double volume = 0;                              ///< signed, Å³
+    std::array<double, 6> dihedral_deg{};           ///< at the edges of tet_edges
     double min_dihedral_deg = 0, max_dihedral_deg = 0;
     /// Circumradius over shortest edge: √6/4 = 0.612 for the regular one, ∞ for a flat one.
     double radius_edge = 0;
@@ -42,7 +42,7 @@ struct TetQuality {
     double min_dihedral_p01_deg = 0;  ///< of the tetrahedra's smallest angles, 1 % are below
     double radius_edge_max = 0, radius_edge_mean = 0;
     double mean_edge_A = 0, min_edge_A = 0, max_edge_A = 0;
-    std::vector<TetRegion> regions;                       ///< by number
+    std::vector<TetRegion> regions;                   ///< by number
     std::array<std::uint64_t, 180> dihedral_histogram{};  ///< all six angles of each, by whole degrees
     std::array<std::uint64_t, radius_edge_bins> radius_edge_histogram{};
 };

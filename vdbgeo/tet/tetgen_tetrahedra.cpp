@@ -6,8 +6,6 @@ namespace vdbgeo {
 
 void TetgenOptions::check() const {}
 bool have_tetgen() { return false; }
-TetMesh tetgen_tetrahedra(const TriMesh&, const TetgenOptions&, const Progress&) {
-    throw NumericalError("not there yet");
-}
+TetMesh tetgen_tetrahedra(const TriMesh&, const TetgenOptions&, const Progress&) { throw NumericalError("not there yet"); }
 
 }  // namespace vdbgeo

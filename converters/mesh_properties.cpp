@@ -20,21 +20,10 @@ const MeshProperty* find_like(const Properties& properties, const MeshProperty& 
     return nullptr;
 }
 
-/// The properties of the first part that all others have, with the values of all.
 Properties common(const std::vector<TriMesh>& parts, Properties TriMesh::*properties) {
-    Properties joined;
-    for (const MeshProperty& first : parts[0].*properties) {
-        MeshProperty all{first.name, first.components, {}};
-        bool everywhere = true;
-        for (const TriMesh& part : parts) {
-            const MeshProperty* const own = find_like(part.*properties, first);
-            if (!own) everywhere = false;
-            if (!everywhere) break;
-            all.values.insert(all.values.end(), own->values.begin(), own->values.end());
-        }
-        if (everywhere) joined.push_back(std::move(all));
-    }
-    return joined;
+    std::vector<const Properties*> all;
+    for (const TriMesh& part : parts) all.push_back(&(part.*properties));
+    return common_properties(all);
 }
 
 }  // namespace
@@ -55,6 +44,23 @@ void check_names(const Properties& properties, const std::string& file, const ch
         if (!taken.insert(p.name).second)
             throw InvalidInput(fmt::format("{}: two properties would be called '{}'", file, p.name));
     }
+}
+
+Properties common_properties(const std::vector<const Properties*>& parts) {
+    Properties joined;
+    if (parts.empty()) return joined;
+    for (const MeshProperty& first : *parts[0]) {
+        MeshProperty all{first.name, first.components, {}};
+        bool everywhere = true;
+        for (const Properties* part : parts) {
+            const MeshProperty* const own = find_like(*part, first);
+            if (!own) everywhere = false;
+            if (!everywhere) break;
+            all.values.insert(all.values.end(), own->values.begin(), own->values.end());
+        }
+        if (everywhere) joined.push_back(std::move(all));
+    }
+    return joined;
 }
 
 TriMesh join_parts(std::vector<TriMesh> parts, const std::string& file) {

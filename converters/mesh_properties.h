@@ -23,6 +23,9 @@ inline std::uint8_t color_byte(float c) { return static_cast<std::uint8_t>(color
 /// `format` is what the message says cannot hold it.
 void check_names(const std::vector<MeshProperty>& properties, const std::string& file, const char* format);
 
+/// The properties of the first part that all others have with as many components, with the values of all.
+std::vector<MeshProperty> common_properties(const std::vector<const std::vector<MeshProperty>*>& parts);
+
 /// All parts as one mesh, in order. Properties stay that all parts have with as many components. Throws
 /// InvalidInput "FILE: …" for more vertices than a mesh can have.
 TriMesh join_parts(std::vector<TriMesh> parts, const std::string& file);

@@ -18,10 +18,25 @@ std::string_view without_plus(std::string_view word) {
     return plus ? word.substr(1) : word;
 }
 
-/// A number whose size no normal float has: zero, a denormal or an infinity, whatever the locale.
-float extreme_number(std::string_view word) {
+/// A number whose size no normal one has: zero, a denormal or an infinity, whatever the locale.
+template <class T>
+T extreme_number(std::string_view word) {
     static const locale_t c_locale = ::newlocale(LC_ALL_MASK, "C", nullptr);
-    return ::strtof_l(std::string(word).c_str(), nullptr, c_locale);
+    const std::string text(word);
+    if constexpr (sizeof(T) == sizeof(float)) return ::strtof_l(text.c_str(), nullptr, c_locale);
+    return static_cast<T>(::strtod_l(text.c_str(), nullptr, c_locale));
+}
+
+template <class T>
+T floating(const TextCursor& at, std::string_view found, const char* what) {
+    const std::string_view digits = without_plus(found);
+    T value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    const bool whole = !digits.empty() && end == digits.data() + digits.size();
+    if (whole && error == std::errc()) return value;
+    if (whole && error == std::errc::result_out_of_range) return extreme_number<T>(digits);
+    if (found.empty()) at.fail(fmt::format("{} is missing", what));
+    at.fail(fmt::format("{}: expected a number, found {}", what, in_quotes(found)));
 }
 
 }  // namespace
@@ -74,6 +89,13 @@ std::string_view TextCursor::word() {
     return {first, static_cast<std::size_t>(at_ - first)};
 }
 
+std::string_view TextCursor::next_word() {
+    for (;;) {
+        if (const std::string_view found = word(); !found.empty()) return found;
+        if (!next_line()) return {};
+    }
+}
+
 void TextCursor::expect_line_end() {
     if (const std::string_view more = word(); !more.empty())
         fail(fmt::format("expected the end of the line, found {}", in_quotes(more)));
@@ -82,14 +104,13 @@ void TextCursor::expect_line_end() {
 float TextCursor::number(const char* what) { return number_in(word(), what); }
 
 float TextCursor::number_in(std::string_view found, const char* what) const {
-    const std::string_view digits = without_plus(found);
-    float value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    const bool whole = !digits.empty() && end == digits.data() + digits.size();
-    if (whole && error == std::errc()) return value;
-    if (whole && error == std::errc::result_out_of_range) return extreme_number(digits);
-    if (found.empty()) fail(fmt::format("{} is missing", what));
-    fail(fmt::format("{}: expected a number, found {}", what, in_quotes(found)));
+    return floating<float>(*this, found, what);
+}
+
+double TextCursor::real(const char* what) { return real_in(word(), what); }
+
+double TextCursor::real_in(std::string_view found, const char* what) const {
+    return floating<double>(*this, found, what);
 }
 
 std::int64_t TextCursor::integer(const char* what) {

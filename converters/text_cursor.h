@@ -24,6 +24,8 @@ class TextCursor {
     bool next_line();
     /// The next word of this line, empty at its end.
     std::string_view word();
+    /// The next word of this line or of those after it, empty at the end of the text.
+    std::string_view next_word();
     /// Passes over what this line still holds.
     void skip_line();
     /// Fails unless this line is used up.
@@ -34,6 +36,9 @@ class TextCursor {
     float number(const char* what);
     /// `text`, a word of this line, as such a number.
     float number_in(std::string_view text, const char* what) const;
+    /// The same as doubles.
+    double real(const char* what);
+    double real_in(std::string_view text, const char* what) const;
     std::int64_t integer(const char* what);
     /// `text`, a part of a word of this line, as a whole number.
     std::int64_t integer_in(std::string_view text, const char* what) const;

@@ -297,10 +297,16 @@ std::optional<VtkType> vtk_type(std::string_view name) {
     return {};
 }
 
+double VtkValues::real(std::uint64_t i) const {
+    const char* const at = data() + i * type_.bytes;
+    if (type_.kind == 'f') return type_.bytes == 4 ? double(load<float>(at, swap_)) : load<double>(at, swap_);
+    if (type_.kind == 'u' && type_.bytes == 8) return static_cast<double>(load<std::uint64_t>(at, swap_));
+    return static_cast<double>(integer(i));
+}
+
 float VtkValues::number(std::uint64_t i) const {
     const char* const at = data() + i * type_.bytes;
-    if (type_.kind == 'f')
-        return type_.bytes == 4 ? load<float>(at, swap_) : static_cast<float>(load<double>(at, swap_));
+    if (type_.kind == 'f') return static_cast<float>(real(i));
     if (type_.kind == 'u' && type_.bytes == 8) return static_cast<float>(load<std::uint64_t>(at, swap_));
     return static_cast<float>(integer(i));
 }

@@ -57,6 +57,7 @@ class VtkValues {
  public:
     std::uint64_t size() const { return size_; }
     float number(std::uint64_t i) const;
+    double real(std::uint64_t i) const;
     /// Fractions are cut off, what no integer holds is the lowest one.
     std::int64_t integer(std::uint64_t i) const;
 

@@ -147,7 +147,13 @@ TEST(MeshVtk, CellsOfEveryFlatKind) {
     EXPECT_EQ(mesh.find_face_property("id")->values, (std::vector<float>{0, 2, 2, 3, 3, 4, 4, -5, -5}));
     std::string solid = grid;
     solid.replace(solid.find("5 1 9 8 6 7"), 11, "5 1 9 8 6 10");
-    EXPECT_EQ(refusal(solid, "m.vtu"), "cell 5 is of type 10: only surfaces are read");
+    EXPECT_EQ(refusal(solid, "m.vtu"),
+              "cell 5 is a tetrahedron: only surfaces are read; vdbgeo convert makes one of the tetrahedra's "
+              "boundary");
+    solid.replace(solid.find("5 1 9 8 6 10"), 12, "5 1 9 8 6 12");
+    EXPECT_EQ(refusal(solid, "m.vtu"), "cell 5 is a hexahedron: only surfaces are read");
+    solid.replace(solid.find("5 1 9 8 6 12"), 12, "5 1 9 8 6 99");
+    EXPECT_EQ(refusal(solid, "m.vtu"), "cell 5 is of type 99: only surfaces are read");
 }
 
 TEST(MeshVtk, PiecesAreJoinedAndColoursOfBytesScaled) {

@@ -330,7 +330,7 @@ TEST(Render, EdgesAreThinDarkLines) {
     // The diagonal is opposite to corner 1 of the first face and corner 2 of the second.
     mesh.face_properties = {{"hidden_edges", 1, {2, 4}}};
     const Image hidden = render(mesh, options);
-    EXPECT_LT(darker(hidden), darker(edges) - 0.8 * diagonal);
+    EXPECT_LT(darker(hidden), darker(edges) - 0.6 * diagonal);
     const int middle_x = (s.left + s.right) / 2, middle_y = (s.top + s.bottom) / 2;
     EXPECT_EQ(colour_at(hidden, middle_x, middle_y), colour_at(plain, middle_x, middle_y));
     // Faces far smaller than a pixel show no lines.

@@ -222,9 +222,11 @@ void add_cut_flags(CLI::App& app, CutawayCommandOptions& o) {
     app.add_option("--at", o.at, "Where along its normal the plane is: 0 nothing is left, 1 all")
         ->capture_default_str();
     app.add_flag("--clip", o.clip, "Cut tetrahedra flat [whole ones go whose middle is beyond the plane]");
-    app.add_option("--peel", o.peel, "Instead of a plane: take away this many tetrahedra, breadth first");
+    app.add_option("--peel", o.peel, "Instead of a plane: take away this many tetrahedra, breadth first")
+        ->check(CLI::NonNegativeNumber.description(""));
     app.add_option("--seed-face", o.seed_face,
-                   "The face of the boundary where a peel begins, from 0 [the one nearest to --from]");
+                   "The face of the boundary where a peel begins, from 0 [the one nearest to --from]")
+        ->check(CLI::NonNegativeNumber.description(""));
     app.add_option("--from", o.from,
                    "Begin a peel at the face nearest to this place, x,y,z in Å [before the front]");
 }

@@ -1,15 +1,17 @@
 // Help, versions and the examples they show.
 #include <sstream>
 
+#include "converters/tet_file.h"
 #include "tests/cli/cli_test.h"
+#include "tests/support/tet_meshes.h"
 
 using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info",      "convert", "phantom",  "denoise", "edges",  "transform", "flow",
-                         "surface",   "remesh",  "simplify", "smooth",  "repair", "measure",   "components",
-                         "curvature", "pockets", "validate", "render",  "model"};
+const Words all_commands{"info",      "convert", "phantom",  "denoise",  "edges",  "transform", "flow",
+                         "surface",   "remesh",  "simplify", "smooth",   "repair", "measure",   "components",
+                         "curvature", "pockets", "cutaway",  "validate", "render", "model"};
 
 struct Promise {
     const char* command;
@@ -41,6 +43,9 @@ const std::vector<Promise> promises{
     {"pockets",
      {"in 1/Å", "in Å²", "in Å [", "--list UINT=20", "--protrusions", "--ambient-radius", "--picture"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
+    {"cutaway",
+     {"--plane TEXT=y", "x,y,z in Å", "in Å³", "--at FLOAT=0.5", "--property TEXT=min_dihedral_deg",
+      "--width INT=1600", "PNG"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
@@ -106,6 +111,7 @@ TEST_F(Help, OfEachCommandHasAnExampleUnitsAndDefaults) {
 TEST_F(Help, ExamplesRun) {
     phantom("emd_1080.map", 24);
     good({"surface", at("emd_1080.map"), at("groel.ply"), "--iso", "0.8"});
+    vdbgeo::write_tets(ball_tets(10, 3), at("groel.vtu"));
     RunOptions here;
     here.folder = folder_.path();
     for (const std::string& command : all_commands) {
@@ -115,10 +121,11 @@ TEST_F(Help, ExamplesRun) {
             // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
             for (std::size_t i = 2; i + 1 < words.size(); ++i)
                 if (words[i] == "--size") words[i + 1] = "24";
-            if (command == "render" || command == "model" ||
-                joined(words).find("--picture") != std::string::npos)
+            const bool picture = command == "render" || command == "model" ||
+                                 (command == "cutaway" && words[3].find(".png") != std::string::npos);
+            if (picture || joined(words).find("--picture") != std::string::npos)
                 for (const char* word : {"--width", "160"}) words.push_back(word);
-            if (command == "render" || command == "model")
+            if (picture)
                 for (const char* word : {"--occlusion", "0"}) words.push_back(word);
             const Ended r = run(words, here);
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
@@ -130,6 +137,6 @@ TEST_F(Help, ExamplesRun) {
           "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
           "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
           "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
-          "pockets.png",      "tips.json"})
+          "pockets.png",      "tips.json",         "inside.png", "half.ply",          "peeled.png"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -272,6 +272,92 @@ TEST(Render, ClassNumbersAreNotMixed) {
     EXPECT_GT(colour_at(image, 140, 80).x(), colour_at(image, 140, 80).z());  // class 3: red
 }
 
+TEST(Render, FacesHaveOneColourEach) {
+    NEEDS_EMBREE();
+    // A square of two faces seen from the front.
+    TriMesh mesh;
+    mesh.points = {{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    const float nothing = std::numeric_limits<float>::quiet_NaN();
+    mesh.face_properties = {{"q", 1, {-5, 5}}, {"vector", 3, std::vector<float>(6, 1)}};
+    RenderOptions options = bare("front", 200);
+    options.outline = false;
+    const auto below = [](const Image& image) { return colour_at(image, 130, 80); };
+    const auto above = [](const Image& image) { return colour_at(image, 70, 30); };
+    const Image plain = render(mesh, options);
+    options.property = "q";
+    const Image coloured = render(mesh, options);
+    EXPECT_GT(below(coloured).z(), below(coloured).x() + 0.2f);  // negative: blue
+    EXPECT_GT(above(coloured).x(), above(coloured).z() + 0.2f);  // positive: red
+    mesh.face_properties[0].values = {nothing, 5};
+    const Image half = render(mesh, options);
+    EXPECT_LT((below(half) - below(plain)).norm(), 0.01f);  // without a value: the plain colour
+    EXPECT_GT((above(half) - above(plain)).norm(), 0.1f);
+    // A property of the vertices goes before one of the faces.
+    mesh.vertex_properties = {{"q", 1, {5, 5, 5, 5}}};
+    options.range_min = -5, options.range_max = 5;
+    const Image vertices = render(mesh, options);
+    EXPECT_GT(below(vertices).x(), below(vertices).z() + 0.2f);
+    options.property = "vector";
+    EXPECT_THROW(render(mesh, options), InvalidInput);
+    options.property = "none";
+    EXPECT_THROW(render(mesh, options), InvalidInput);
+}
+
+TEST(Render, EdgesAreThinDarkLines) {
+    NEEDS_EMBREE();
+    TriMesh mesh;
+    mesh.points = {{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    RenderOptions options = bare("front", 200);
+    options.outline = false;
+    const Image plain = render(mesh, options);
+    options.edges = true;
+    const Image edges = render(mesh, options);
+    // What is darker: the four sides and the diagonal, about a pixel wide each.
+    const auto darker = [&](const Image& image) {
+        double sum = 0;
+        for (int y = 0; y < plain.height; ++y)
+            for (int x = 0; x < plain.width; ++x)
+                sum += colour_at(image, x, y).sum() < 0.85f * colour_at(plain, x, y).sum();
+        return sum;
+    };
+    const Silhouette s = silhouette(plain);
+    const double sides = 2 * (s.width() + s.height()), diagonal = std::hypot(s.width(), s.height());
+    EXPECT_GT(darker(edges), 0.8 * (0.5 * sides + diagonal));
+    EXPECT_LT(darker(edges), 2.5 * (sides + diagonal));
+    EXPECT_EQ(colour_at(edges, 130, 80), colour_at(plain, 130, 80));  // far from all edges
+    // The diagonal is opposite to corner 1 of the first face and corner 2 of the second.
+    mesh.face_properties = {{"hidden_edges", 1, {2, 4}}};
+    const Image hidden = render(mesh, options);
+    EXPECT_LT(darker(hidden), darker(edges) - 0.6 * diagonal);
+    const int middle_x = (s.left + s.right) / 2, middle_y = (s.top + s.bottom) / 2;
+    EXPECT_EQ(colour_at(hidden, middle_x, middle_y), colour_at(plain, middle_x, middle_y));
+    // Faces far smaller than a pixel show no lines.
+    const TriMesh fine = icosphere(6, 10);
+    RenderOptions small = bare("front", 64);
+    const Image smooth = render(fine, small);
+    small.edges = true;
+    EXPECT_LT(mean_difference(render(fine, small), smooth), 1);
+}
+
+TEST(Render, FromAnyDirection) {
+    NEEDS_EMBREE();
+    const TriMesh mesh = lopsided();
+    const auto seen = [&](const char* view) { return render(mesh, bare(view)); };
+    EXPECT_EQ(seen("0,-1,0").pixels, seen("front").pixels);
+    EXPECT_EQ(seen("2.5,0,0").pixels, seen("side").pixels);
+    EXPECT_EQ(seen("0,0,1e-3").pixels, seen("top").pixels);
+    EXPECT_EQ(seen("0.55,-0.75,0.55").pixels, seen("iso").pixels);
+    EXPECT_NE(seen("0,1,0").pixels, seen("front").pixels);
+    for (const char* view :
+         {"1,2", "1,2,3,4", "0,0,0", "1,,2", "1,2,3 ", "nan,0,0", "inf,0,0", ",1,2", "1,2,"}) {
+        RenderOptions options;
+        options.view = view;
+        EXPECT_THROW(options.check(), InvalidInput) << view;
+    }
+}
+
 TEST(Render, SameBytesForAnyNumberOfThreads) {
     NEEDS_EMBREE();
     RenderOptions options;

@@ -74,7 +74,8 @@ std::array<Vec3d, 4> corners(const TetMesh& mesh, std::size_t t) {
 std::pair<double, double> angle_range(const TetMesh& mesh) {
     double least = 180, largest = 0;
     for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-        for (const double a : dihedrals(corners(mesh, t))) least = std::min(least, a), largest = std::max(largest, a);
+        for (const double a : dihedrals(corners(mesh, t)))
+            least = std::min(least, a), largest = std::max(largest, a);
     return {least, largest};
 }
 
@@ -84,31 +85,43 @@ double volume(const TetMesh& mesh) {
     return sum / 6;
 }
 
+using Edge = std::pair<VertexId, VertexId>;
+
 /// Edges that the boundary's triangles do not run through as often one way as the other.
 std::size_t open_edges(const TetMesh& mesh) {
-    std::map<std::pair<VertexId, VertexId>, int> uses;
+    std::vector<std::pair<Edge, int>> uses;
     for (const Triangle& f : mesh.faces)
         for (std::size_t k = 0; k < 3; ++k) {
             const VertexId a = f[k], b = f[(k + 1) % 3];
-            uses[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+            uses.push_back({std::minmax(a, b), a < b ? 1 : -1});
         }
-    return static_cast<std::size_t>(
-        std::count_if(uses.begin(), uses.end(), [](const auto& e) { return e.second != 0; }));
+    std::sort(uses.begin(), uses.end());
+    std::size_t open = 0;
+    for (std::size_t k = 0, next = 0; k < uses.size(); k = next) {
+        int sum = 0;
+        for (next = k; next < uses.size() && uses[next].first == uses[k].first; ++next)
+            sum += uses[next].second;
+        open += sum != 0;
+    }
+    return open;
 }
 
 /// V − E + F − T.
 std::int64_t euler(const TetMesh& mesh) {
-    std::set<std::pair<VertexId, VertexId>> edges;
+    std::vector<Edge> edges;
     for (const Tetrahedron& t : mesh.tets)
         for (const auto& e : tet_edges)
-            edges.insert(std::minmax(t[static_cast<std::size_t>(e[0])], t[static_cast<std::size_t>(e[1])]));
-    const auto tets = static_cast<std::int64_t>(mesh.tets.size()), outer = static_cast<std::int64_t>(mesh.faces.size());
-    return static_cast<std::int64_t>(mesh.points.size()) - static_cast<std::int64_t>(edges.size()) +
-           (4 * tets + outer) / 2 - tets;
+            edges.push_back(
+                std::minmax(t[static_cast<std::size_t>(e[0])], t[static_cast<std::size_t>(e[1])]));
+    std::sort(edges.begin(), edges.end());
+    const auto different = std::unique(edges.begin(), edges.end()) - edges.begin();
+    const auto tets = static_cast<std::int64_t>(mesh.tets.size()),
+               outer = static_cast<std::int64_t>(mesh.faces.size());
+    return static_cast<std::int64_t>(mesh.points.size()) - different + (4 * tets + outer) / 2 - tets;
 }
 
-/// What every result promises: conforming, positive, no vertex unused, angles in the bounds, faces as set_faces
-/// gives them, closed.
+/// What every result promises: conforming, positive, no vertex unused, angles in the bounds, faces as
+/// set_faces gives them, closed.
 void expect_sound(const TetMesh& mesh) {
     check(mesh, "stuffing");
     ASSERT_FALSE(mesh.empty());
@@ -188,8 +201,8 @@ class AnyTetrahedron {
         }
     }
 
-    /// Least and largest dihedral angle of the stencil; nothing where two snapped points come towards each other
-    /// or a point is snapped towards one on its own side.
+    /// Least and largest dihedral angle of the stencil; nothing where two snapped points come towards each
+    /// other or a point is snapped towards one on its own side.
     std::optional<std::pair<double, double>> angles() const {
         std::array<Vec3d, 10> p;
         for (std::size_t k = 0; k < 4; ++k) {
@@ -202,7 +215,8 @@ class AnyTetrahedron {
             p[k] += part_[k] * steps_[direction_[k]];
         }
         for (std::size_t e = 0; e < 6; ++e) {
-            const auto a = static_cast<std::size_t>(tet_edges[e][0]), b = static_cast<std::size_t>(tet_edges[e][1]);
+            const auto a = static_cast<std::size_t>(tet_edges[e][0]),
+                       b = static_cast<std::size_t>(tet_edges[e][1]);
             p[4 + e] = lattice(a) + cut_[e] * (lattice(b) - lattice(a));
         }
         int larger = 0;
@@ -217,15 +231,15 @@ class AnyTetrahedron {
         for (int t = 0; t < stencil.count; ++t) {
             std::array<Vec3d, 4> q;
             for (std::size_t k = 0; k < 4; ++k) q[k] = p[stencil.tets[static_cast<std::size_t>(t)][k]];
-            for (const double a : dihedrals(q))
-                range = {std::min(range.first, a), std::max(range.second, a)};
+            for (const double a : dihedrals(q)) range = {std::min(range.first, a), std::max(range.second, a)};
         }
         return range;
     }
 
  private:
     Vec3d lattice(std::size_t k) const {
-        const std::array<Vec3d, 4> p{Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0.5, 0.5, -0.5), Vec3d(0.5, 0.5, 0.5)};
+        const std::array<Vec3d, 4> p{Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0.5, 0.5, -0.5),
+                                     Vec3d(0.5, 0.5, 0.5)};
         return mirrored_ ? Vec3d(p[k].x(), -p[k].z(), p[k].y()) : p[k];  // a quarter turn: the other parity
     }
     double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
@@ -286,13 +300,15 @@ TEST(StuffingStencils, FillTheInside) {
     for (int n = 0; n < 81; ++n)
         for (int choice = 0; choice < 8; ++choice) {
             const std::array<int, 4> sign{n / 27, n / 9 % 3, n / 3 % 3, n % 3};
-            if (std::count(sign.begin(), sign.end(), 2) + std::count(sign.begin(), sign.end(), 0) == 0) continue;
+            if (std::count(sign.begin(), sign.end(), 2) + std::count(sign.begin(), sign.end(), 0) == 0)
+                continue;
             double sum = 0;
             for (const bool turned : {false, true}) {
                 const auto s = [&](std::size_t k) {
                     return static_cast<stuffing::Sign>(turned ? 2 - sign[k] : sign[k]);
                 };
-                const auto& st = stuffing::stencil(s(0), s(1), s(2), s(3), choice & 1, choice & 2, choice & 4);
+                const auto& st =
+                    stuffing::stencil(s(0), s(1), s(2), s(3), choice & 1, choice & 2, choice & 4);
                 for (int t = 0; t < st.count; ++t) {
                     std::array<Vec3d, 4> q;
                     for (std::size_t k = 0; k < 4; ++k) {
@@ -330,12 +346,17 @@ Shape shape_of(const TetMesh& mesh, const Vec3d& origin, double cell) {
     return out;
 }
 
-void expect_as_oracle(const DensityMap& map, double isovalue, double cell, int low, int high) {
+/// `same_roots`: with the library's root finder, where edges are crossed more than once.
+void expect_as_oracle(const DensityMap& map, double isovalue, double cell, int low, int high,
+                      bool same_roots) {
     const double h = map.frame.axes(0, 0);
     const TetMesh mesh = isosurface_stuffing(map, isovalue, with(cell, 0));
     expect_sound(mesh);
     const TrilinearField field(map, isovalue);
-    const test::StuffingOracle oracle([&](const Vec3d& p) { return field(cell * p); }, low, high,
+    const stuffing::Lattice lattice(map, isovalue, cell);
+    test::StuffingOracle::Root root;
+    if (same_roots) root = [&](const Vec3d& in, const Vec3d& out) { return lattice.root(in, out); };
+    const test::StuffingOracle oracle([&](const Vec3d& p) { return field(cell * p); }, root, low, high,
                                       stuffing::alpha_long, stuffing::alpha_short);
     Shape expected;
     for (const auto& t : oracle.tets()) {
@@ -348,20 +369,24 @@ void expect_as_oracle(const DensityMap& map, double isovalue, double cell, int l
     const Shape found = shape_of(mesh, map.frame.origin, cell * h);
     std::size_t missing = 0;
     for (const auto& t : found) missing += expected.count(t) == 0;
-    // Roots differ by 1e-10 or so: a few places may be rounded the other way.
-    EXPECT_LE(missing, found.size() / 200 + 2);
+    // Roots may differ by 1e-10: a few places are then rounded the other way.
+    EXPECT_LE(missing, same_roots ? 0 : found.size() / 200);
 }
 
 TEST_F(IsosurfaceStuffing, IsThePlainAlgorithm) {
-    expect_as_oracle(sphere_map(24, 7.3, Vec3d(0.3, -0.2, 0.4)), 0, 1.3, -2, 20);
+    expect_as_oracle(sphere_map(24, 7.3, Vec3d(0.3, -0.2, 0.4)), 0, 1.3, -2, 20, false);
     Frame frame;
     frame.axes *= 2.5;
     frame.origin = Vec3d(-3, 7, 11);
     for (const std::uint64_t seed : {3, 4, 5}) {
         const int n = 12;
         std::vector<float> values = test::noise(static_cast<std::size_t>(n * n * n), seed);
-        expect_as_oracle(map_from_values(Vec3i::Constant(n), values, frame), 0.3, 0.6 + 0.3 * static_cast<double>(seed - 3),
-                         -2, 22);
+        // Away from the border: along its edges many cut points are equally near.
+        for (int k = 0; k < n * n * n; ++k)
+            for (const int i : {k % n, k / n % n, k / n / n})
+                if (i == 0 || i == n - 1) values[static_cast<std::size_t>(k)] = -1;
+        expect_as_oracle(map_from_values(Vec3i::Constant(n), values, frame), 0.3,
+                         0.6 + 0.3 * static_cast<double>(seed - 3), -2, 22, true);
     }
 }
 
@@ -414,9 +439,9 @@ TEST_F(IsosurfaceStuffing, VolumesAreThoseOfMarchingCubesAtTheDefaultCell) {
 TEST_F(IsosurfaceStuffing, NoiseIsSound) {
     const DensityMap map = phantom_map("atpase", 48, 0.5);
     for (const double cell : {0.8, 1.5}) expect_sound(isosurface_stuffing(map, 0.5, with(cell, 3)));
-    const std::vector<float> values = test::noise(32 * 32 * 32, 17);
-    const DensityMap noise = map_from_values(Vec3i::Constant(32), values);
-    for (const double cell : {0.4, 1.0, 2.3}) expect_sound(isosurface_stuffing(noise, 0.1, with(cell, 2)));
+    const std::vector<float> values = test::noise(24 * 24 * 24, 17);
+    const DensityMap noise = map_from_values(Vec3i::Constant(24), values);
+    for (const double cell : {0.5, 1.0, 2.3}) expect_sound(isosurface_stuffing(noise, 0.1, with(cell, 2)));
 }
 
 // --- Grading ----------------------------------------------------------------------------------------------
@@ -434,7 +459,7 @@ std::set<std::array<std::array<std::int64_t, 3>, 3>> boundary_shape(const TetMes
 }
 
 TEST_F(IsosurfaceStuffing, GradingChangesNothingAtTheSurface) {
-    const DensityMap map = phantom_map("torus", 80);
+    const DensityMap map = phantom_map("torus", 56);
     const TetMesh uniform = isosurface_stuffing(map, 0, with(0.8, 0));
     const auto boundary = boundary_shape(uniform);
     std::size_t before = uniform.tets.size();
@@ -442,12 +467,12 @@ TEST_F(IsosurfaceStuffing, GradingChangesNothingAtTheSurface) {
         const TetMesh mesh = isosurface_stuffing(map, 0, with(0.8, coarsening));
         expect_sound(mesh);
         EXPECT_EQ(boundary_shape(mesh), boundary);
-        EXPECT_NEAR(volume(mesh) / volume(uniform), 1, 1e-12);
+        EXPECT_NEAR(volume(mesh) / volume(uniform), 1, 1e-11);
         EXPECT_EQ(euler(mesh), 0);
         EXPECT_LE(mesh.tets.size(), before);
         before = mesh.tets.size();
     }
-    EXPECT_LT(before, uniform.tets.size() / 2);
+    EXPECT_LT(before, 3 * uniform.tets.size() / 4);
 }
 
 /// A tetrahedron's six angles, sorted and rounded to degrees.
@@ -473,7 +498,7 @@ TEST_F(IsosurfaceStuffing, InsideAreTheFourShapesOfTheBackground) {
         sizes[angle_type(dihedrals(corners(mesh, t)))].insert(
             std::lround(std::log2(tet_determinant(mesh, t) / (0.4 * 0.4 * 0.4 / 2))));
     }
-    const std::array<long, 6> whole{60, 60, 60, 60, 90, 90}, half{45, 60, 60, 60, 90, 90},
+    const std::array<long, 6> whole{60, 60, 60, 60, 90, 90}, half{45, 60, 60, 90, 90, 90},
         quarter{45, 45, 60, 90, 90, 90}, pyramid{45, 45, 60, 60, 90, 120};
     ASSERT_EQ(sizes.size(), 4u);
     for (const auto& type : {whole, half, quarter, pyramid}) EXPECT_EQ(sizes.count(type), 1u);
@@ -497,8 +522,8 @@ TEST_F(IsosurfaceStuffing, CellsAreCubesInAnyFrame) {
         frame.origin = Vec3d(100, -50, 20);
         const Vec3d middle = frame.to_world(0.5 * (size.cast<double>() - Vec3d::Ones()));
         const double radius = 14;
-        const DensityMap map = map_from_function(
-            size, frame, [&](const Vec3d& p) { return radius - (p - middle).norm(); });
+        const DensityMap map =
+            map_from_function(size, frame, [&](const Vec3d& p) { return radius - (p - middle).norm(); });
         const TetMesh mesh = isosurface_stuffing(map, 0, with(1.2, 2));
         expect_sound(mesh);
         EXPECT_NEAR(volume(mesh) / (4 * M_PI * std::pow(radius, 3) / 3), 1, 0.02);
@@ -542,8 +567,8 @@ TEST_F(IsosurfaceStuffing, Cancels) {
 
 TEST_F(IsosurfaceStuffing, RefusesBadOptionsAndEmptyMaps) {
     const DensityMap map = sphere_map(20, 6);
-    for (const double cell : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
-                              std::numeric_limits<double>::infinity()})
+    for (const double cell :
+         {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
         EXPECT_THROW(isosurface_stuffing(map, 0, with(cell, 1)), InvalidInput);
     for (const int coarsening : {-1, 9})
         EXPECT_THROW(isosurface_stuffing(map, 0, with(1, coarsening)), InvalidInput);
@@ -603,9 +628,9 @@ TEST_F(IsosurfaceStuffing, OneVoxel) {
     values[4 + 9 * (4 + 9 * 4)] = 1;
     const DensityMap map = map_from_values(Vec3i::Constant(9), values);
     for (const double cell : {0.2, 0.5, 1.0}) expect_sound(isosurface_stuffing(map, 0.5, with(cell, 3)));
-    // The voxel is a lattice point for a cell of 4; for 3 none is near.
-    expect_sound(isosurface_stuffing(map, 0.5, with(4, 3)));
-    EXPECT_THROW(isosurface_stuffing(map, 0.5, with(3, 3)), NumericalError);
+    // No lattice point is inside, or it is so near to the surface that it is snapped.
+    for (const double cell : {3.0, 4.0})
+        EXPECT_THROW(isosurface_stuffing(map, 0.5, with(cell, 3)), NumericalError);
 }
 
 TEST_F(IsosurfaceStuffing, SamplesThatAreNoNumbersAreEmpty) {
@@ -621,9 +646,10 @@ TEST_F(IsosurfaceStuffing, SamplesThatAreNoNumbersAreEmpty) {
 }
 
 TEST_F(IsosurfaceStuffing, WideConstantRegions) {
-    // A fog volume: 1 inside, 0 outside, a ramp of one voxel; and far apart pieces of a sparse unbounded grid.
+    // A fog volume: 1 inside, 0 outside, a ramp of one voxel; and far apart pieces of a sparse unbounded
+    // grid.
     auto grid = openvdb::FloatGrid::create(0.0f);
-    grid->denseFill(openvdb::CoordBBox(openvdb::Coord(-40), openvdb::Coord(47)), 1.0f, true);
+    grid->denseFill(openvdb::CoordBBox(openvdb::Coord(-24), openvdb::Coord(31)), 1.0f, true);
     const openvdb::Coord far(100000, -70000, 50000);
     grid->denseFill(openvdb::CoordBBox(far, far.offsetBy(9)), 1.0f, true);
     grid->pruneGrid();
@@ -631,7 +657,7 @@ TEST_F(IsosurfaceStuffing, WideConstantRegions) {
     ASSERT_FALSE(map.frame.bounded());
     const TetMesh mesh = isosurface_stuffing(map, 0.5, with(1, 4));
     expect_sound(mesh);
-    EXPECT_NEAR(volume(mesh) / (std::pow(88, 3) + 1000), 1, 0.01);
+    EXPECT_NEAR(volume(mesh) / (std::pow(56, 3) + 1000), 1, 0.01);
     EXPECT_EQ(euler(mesh), 2);
 }
 

@@ -1,5 +1,5 @@
-// Isosurface stuffing on a small uniform lattice, the plain way: serial, everything in maps, bisection for roots.
-// It shares no code with the library's.
+// Isosurface stuffing on a small uniform lattice, the plain way: serial, everything in maps, bisection for
+// roots. It shares no code with the library's.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,22 @@ namespace vdbgeo::test {
 
 class StuffingOracle {
  public:
-    using Point = std::array<int, 3>;        // twice the lattice's coordinates: all even or all odd
-    using Edge = std::pair<Point, Point>;    // the smaller first; {p, p} stands for a point of the lattice
+    using Point = std::array<int, 3>;      // twice the lattice's coordinates: all even or all odd
+    using Edge = std::pair<Point, Point>;  // the smaller first; {p, p} stands for a point of the lattice
     using Tet = std::array<Edge, 4>;
 
-    /// f is above or equal 0 inside; the lattice runs from `low` to `high` (in cells).
-    StuffingOracle(std::function<double(const Vec3d&)> f, int low, int high, double alpha_long, double alpha_short)
-        : f_(std::move(f)), low_(2 * low), high_(2 * high), alpha_{alpha_long, alpha_short} {
+    /// Where the field is 0 between a point inside and one outside.
+    using Root = std::function<double(const Vec3d& in, const Vec3d& out)>;
+
+    /// f is above or equal 0 inside; the lattice runs from `low` to `high` (in cells). Without `root`:
+    /// bisection.
+    StuffingOracle(std::function<double(const Vec3d&)> f, Root root, int low, int high, double alpha_long,
+                   double alpha_short)
+        : f_(std::move(f)),
+          root_(std::move(root)),
+          low_(2 * low),
+          high_(2 * high),
+          alpha_{alpha_long, alpha_short} {
         for_each_point([&](const Point& p) { inside_[p] = f_(place(p)) >= 0; });
         find_cuts();
         choose_snaps();
@@ -69,6 +78,10 @@ class StuffingOracle {
                 const Point q = plus(p, s);
                 const auto other = inside_.find(q);
                 if (other == inside_.end() || other->second == in || !(p < q)) continue;
+                if (root_) {
+                    cuts_[{p, q}] = in ? root_(place(p), place(q)) : 1 - root_(place(q), place(p));
+                    continue;
+                }
                 double a = 0, b = 1;  // the sign at a is that of p
                 for (int k = 0; k < 60; ++k) {
                     const double t = 0.5 * (a + b);
@@ -193,7 +206,8 @@ class StuffingOracle {
             const auto before = faces;
             for (const bool first : {true, false}) {
                 faces = before;
-                quad(edge(in[0], out[0]), edge(in[0], out[1]), edge(in[1], out[1]), edge(in[1], out[0]), first);
+                quad(edge(in[0], out[0]), edge(in[0], out[1]), edge(in[1], out[1]), edge(in[1], out[0]),
+                     first);
                 if (cone(faces)) return;
             }
         }
@@ -214,6 +228,7 @@ class StuffingOracle {
     }
 
     std::function<double(const Vec3d&)> f_;
+    Root root_;
     int low_, high_;
     std::array<double, 2> alpha_;
     std::map<Point, bool> inside_;

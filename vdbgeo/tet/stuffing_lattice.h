@@ -102,8 +102,8 @@ class Lattice {
     Vec3d to_index(const Vec3d& lattice) const { return to_index_ * lattice; }
     const Mat3d& from_index() const { return from_index_; }
 
-    /// Above or equal 0 inside. Where an unbounded grid's background is inside, everything is turned over, and
-    /// the solid is the rest.
+    /// Above or equal 0 inside. Where an unbounded grid's background is inside, everything is turned over,
+    /// and the solid is the rest.
     double operator()(const Vec3d& lattice) const {
         const double v = field_(to_index_ * lattice);
         if (!turned_) return v;

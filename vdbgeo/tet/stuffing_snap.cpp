@@ -42,7 +42,8 @@ std::array<std::array<IncidentEdge, 14>, 2> make_incident_edges() {
             if (kind == centre)
                 edges[n++] = {corner, up, {}, 6 + b, true, direction};
             else
-                edges[n++] = {centre, {-up[0], -up[1], -up[2]}, {-up[0], -up[1], -up[2]}, 6 + b, false, -direction};
+                edges[n++] = {centre,    {-up[0], -up[1], -up[2]}, {-up[0], -up[1], -up[2]}, 6 + b, false,
+                              -direction};
         }
     }
     return out;
@@ -244,7 +245,8 @@ void SnappedLattice::snap(const Progress& progress) {
     finish_snaps();
 }
 
-/// What the rules say of a point: undecided where neither applies. With `best`: the nearest allowed cut point.
+/// What the rules say of a point: undecided where neither applies. With `best`: the nearest allowed cut
+/// point.
 std::uint8_t SnappedLattice::judge(const SurfaceBlock& s, int slot, Snap* best) const {
     const Kind kind = kind_of(slot);
     const auto [x, y, z] = place_of(slot);

@@ -66,7 +66,8 @@ double Lattice::root(const Vec3d& in, const Vec3d& out) const {
     constexpr int most = 160;
     const Vec3d start = to_index_ * in, step = to_index_ * (out - in);
     const double sign = turned_ ? -1 : 1;
-    const auto f = [&](double t) { return sign * field_(start + t * step); };
+    TrilinearField::Cursor cursor;
+    const auto f = [&](double t) { return sign * field_(start + t * step, cursor); };
     double a = 0, fa = f(0), b = 1, fb = f(1);  // f(a) ≥ 0 > f(b)
     if (!(fa > 0)) return 0;
     if (!std::isfinite(fb)) {

@@ -103,7 +103,7 @@ double TrilinearField::without_nan(const Corners& d, const Vec3d& t) {
     return lost > 1.0 / 1024 ? -std::numeric_limits<double>::infinity() : sum;
 }
 
-double TrilinearField::operator()(const Vec3d& index) const {
+double TrilinearField::operator()(const Vec3d& index, Cursor& cursor) const {
     constexpr double nothing = -std::numeric_limits<double>::infinity(), far = 0x1p30;
     Coord c;
     Vec3d t;
@@ -119,7 +119,8 @@ double TrilinearField::operator()(const Vec3d& index) const {
         }
         t[a] = x - c[a];
     }
-    const Corners d = corners(c);
+    if (c != cursor.cell_) cursor.cell_ = c, cursor.corners_ = corners(c);
+    const Corners& d = cursor.corners_;
     const auto mix = [](double p, double q, double w) { return p + (q - p) * w; };
     const double value = mix(mix(mix(d[0], d[1], t.x()), mix(d[2], d[3], t.x()), t.y()),
                              mix(mix(d[4], d[5], t.x()), mix(d[6], d[7], t.x()), t.y()), t.z());

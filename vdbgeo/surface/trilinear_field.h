@@ -25,7 +25,18 @@ class TrilinearField {
  public:
     TrilinearField(const DensityMap& map, double isovalue);
 
-    double operator()(const Vec3d& index) const;
+    double operator()(const Vec3d& index) const {
+        Cursor cursor;
+        return (*this)(index, cursor);
+    }
+
+    /// The corners of the cell of the last query: queries near each other need not look for them again.
+    class Cursor {
+        friend class TrilinearField;
+        openvdb::Coord cell_ = openvdb::Coord::max();
+        std::array<double, 8> corners_;
+    };
+    double operator()(const Vec3d& index, Cursor& cursor) const;
 
     /// The sample at a voxel as the grid stores it, outside the box too.
     double value(const openvdb::Coord& c) const;

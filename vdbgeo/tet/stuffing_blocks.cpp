@@ -76,7 +76,8 @@ class Marker {
 void mark_cells(Marker& marker, const Coord& origin, const Bits& crossed, const Frame& frame) {
     constexpr std::uint64_t two_rows = 0x0303;
     for (int x = 0; x < dim; x += 2) {
-        const std::uint64_t pair = crossed[static_cast<std::size_t>(x)] | crossed[static_cast<std::size_t>(x + 1)];
+        const std::uint64_t pair =
+            crossed[static_cast<std::size_t>(x)] | crossed[static_cast<std::size_t>(x + 1)];
         if (pair == 0) continue;
         for (int y = 0; y < dim; y += 2)
             for (int z = 0; z < dim; z += 2) {
@@ -93,10 +94,10 @@ void mark_cells(Marker& marker, const Coord& origin, const Bits& crossed, const 
 Bits crossed_cells(const CornerSigns& s) {
     Bits crossed{};
     for (int x = 0; x < dim; ++x) {
-        const std::uint64_t all = s.here[x] & s.y[x] & s.z[x] & s.yz[x] & s.here[x + 1] & s.y[x + 1] & s.z[x + 1] &
-                                  s.yz[x + 1];
-        const std::uint64_t some = s.here[x] | s.y[x] | s.z[x] | s.yz[x] | s.here[x + 1] | s.y[x + 1] |
-                                   s.z[x + 1] | s.yz[x + 1];
+        const std::uint64_t all =
+            s.here[x] & s.y[x] & s.z[x] & s.yz[x] & s.here[x + 1] & s.y[x + 1] & s.z[x + 1] & s.yz[x + 1];
+        const std::uint64_t some =
+            s.here[x] | s.y[x] | s.z[x] | s.yz[x] | s.here[x + 1] | s.y[x + 1] | s.z[x + 1] | s.yz[x + 1];
         crossed[static_cast<std::size_t>(x)] = some & ~all;
     }
     return crossed;
@@ -125,7 +126,8 @@ void mark_side(Marker& marker, const DensityMap& map, float isovalue, const Side
                 v[side.axis] = side.at, v[b] += i, v[c] += j;
                 if (v[b] >= map.frame.size[b] || v[c] >= map.frame.size[c]) continue;
                 if (leaf ? leaf->getValue(v) >= isovalue : constant_in)
-                    samples[static_cast<std::size_t>(v[0] & 7)] |= std::uint64_t{1} << bit_of(v[1] & 7, v[2] & 7);
+                    samples[static_cast<std::size_t>(v[0] & 7)] |= std::uint64_t{1}
+                                                                   << bit_of(v[1] & 7, v[2] & 7);
             }
         for_each_bit(samples, [&](int x, int y, int z) {
             // The cells around the sample: from one before it to itself.
@@ -147,7 +149,8 @@ std::vector<MarkedBlock> mark_blocks(const DensityMap& map, double isovalue, con
                                      std::uint64_t max_blocks, const Progress& progress) {
     const Frame& frame = map.frame;
     if (frame.bounded() && frame.size.minCoeff() < 2) return {};  // no cells
-    const CrossingBlocks crossing(map.grid->tree(), frame, static_cast<float>(isovalue), progress.part(0, 0.5));
+    const CrossingBlocks crossing(map.grid->tree(), frame, static_cast<float>(isovalue),
+                                  progress.part(0, 0.5));
     std::vector<Side> sides;
     if (frame.bounded())
         for (int axis = 0; axis < 3; ++axis)

@@ -20,8 +20,8 @@ struct MarkedBlock {
 /// that is marked. So the points of a brick that is not, and of all blocks that are not, are on one side.
 ///
 /// Found from the voxels: the surface runs in cells with samples on both sides and through the border of the
-/// box, and the ends of an edge lie within one cell of the lattice of the crossing. Cost: in proportion to the
-/// crossed voxels.
+/// box, and the ends of an edge lie within one cell of the lattice of the crossing. Cost: in proportion to
+/// the crossed voxels.
 std::vector<MarkedBlock> mark_blocks(const DensityMap& map, double isovalue, const Lattice& lattice,
                                      std::uint64_t max_blocks, const Progress& progress);
 
@@ -45,16 +45,19 @@ class BlockTable {
     const Block& operator[](std::size_t b) const { return blocks_[b]; }
     std::int32_t find(const Coord& at) const;
     /// The block of the slot (x, y, z) of block b, each −8…15.
-    std::int32_t near(std::size_t b, int x, int y, int z) const { return blocks_[b].around[side_of(x, y, z)]; }
+    std::int32_t near(std::size_t b, int x, int y, int z) const {
+        return blocks_[b].around[side_of(x, y, z)];
+    }
 
  private:
-    /// Consecutive keys: a node of the octree over blocks without a marked one, all inside; or one marked block.
+    /// Consecutive keys: a node of the octree over blocks without a marked one, all inside; or one marked
+    /// block.
     struct Run {
         std::uint64_t key, count;
         std::int32_t marked;
     };
-    void add_node(const std::vector<MarkedBlock>& marked, std::size_t begin, std::size_t end, std::uint64_t key,
-                  int level, const Lattice& lattice);
+    void add_node(const std::vector<MarkedBlock>& marked, std::size_t begin, std::size_t end,
+                  std::uint64_t key, int level, const Lattice& lattice);
     void fill(std::uint64_t max_blocks);
 
     std::vector<Run> runs_;

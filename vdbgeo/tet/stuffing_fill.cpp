@@ -35,19 +35,20 @@ struct Writer {
         *tets++ = t;
         for (std::size_t k = 0; boundary; ++k, boundary >>= 1)
             if (boundary & 1) {
-                for (std::size_t c = 0; c < 3; ++c) (*faces)[c] = t[static_cast<std::size_t>(tet_faces[k][c])];
+                for (std::size_t c = 0; c < 3; ++c)
+                    (*faces)[c] = t[static_cast<std::size_t>(tet_faces[k][c])];
                 ++faces;
             }
     }
 };
 
-/// Goes through the tetrahedra of one block: those around the faces that its cells of level 0 have with the next
-/// ones up each axis, then those of its cells at larger ones, then those of its larger leaves.
+/// Goes through the tetrahedra of one block: those around the faces that its cells of level 0 have with the
+/// next ones up each axis, then those of its cells at larger ones, then those of its larger leaves.
 template <class Sink>
 class BlockFiller {
  public:
-    BlockFiller(const SnappedLattice& points, const Octree& octree, const VertexTable& vertices, std::size_t b,
-                Sink& sink)
+    BlockFiller(const SnappedLattice& points, const Octree& octree, const VertexTable& vertices,
+                std::size_t b, Sink& sink)
         : points_(points), octree_(octree), vertices_(vertices), b_(b), sink_(sink) {}
 
     void run() {
@@ -77,7 +78,8 @@ class BlockFiller {
                 for (int y = 0; y <= dim; ++y)
                     for (int z = 0; z <= dim; ++z)
                         if (vertices_.used(b_, kind, x, y, z))
-                            number_[static_cast<std::size_t>(kind)][x][y][z] = vertices_.at(b_, kind, x, y, z);
+                            number_[static_cast<std::size_t>(kind)][x][y][z] =
+                                vertices_.at(b_, kind, x, y, z);
     }
 
     VertexId number(const Place& p) const {
@@ -85,9 +87,9 @@ class BlockFiller {
     }
     bool is_plus(const Place& p) const { return plus_[static_cast<std::size_t>(p.kind)].at(p.x, p.y, p.z); }
     Sign sign(const Place& p) const {
-        return is_plus(p)                                                       ? Sign::plus
+        return is_plus(p)                                                  ? Sign::plus
                : zero_[static_cast<std::size_t>(p.kind)].at(p.x, p.y, p.z) ? Sign::zero
-                                                                                : Sign::minus;
+                                                                           : Sign::minus;
     }
 
     /// Corners of the upper face across the axis of cell (x, y, z), counter-clockwise seen from further up.
@@ -111,7 +113,8 @@ class BlockFiller {
             for (int y = 0; y < dim; ++y) {
                 const auto row = [&](const Halo& h, int i, int j, int k) { return h.row8(x + i, y + j, k); };
                 const std::uint64_t pair = row(cells_, 0, 0, 0) & row(cells_, up[0], up[1], up[2]);
-                std::uint64_t here = row(plus_[centre], 0, 0, 0), there = row(plus_[centre], up[0], up[1], up[2]);
+                std::uint64_t here = row(plus_[centre], 0, 0, 0),
+                              there = row(plus_[centre], up[0], up[1], up[2]);
                 std::uint64_t some = here | there, every = here & there;
                 for (const Place& p : ring) {
                     const std::uint64_t corners = row(plus_[corner], p.x, p.y, p.z);
@@ -159,7 +162,8 @@ class BlockFiller {
             if (r >= 4 || s[r] == Sign::zero) on_surface |= 1u << k;
             if (r >= 4) cuts |= 1u << k;
             if (Sink::numbers)
-                numbers[k] = r < 4 ? number(tet[r]) : cut_number(tet, tet_edges[static_cast<std::size_t>(r - 4)]);
+                numbers[k] =
+                    r < 4 ? number(tet[r]) : cut_number(tet, tet_edges[static_cast<std::size_t>(r - 4)]);
         }
         FaceMask boundary = 0;
         for (std::size_t k = 0; k < 4; ++k) {
@@ -172,8 +176,8 @@ class BlockFiller {
         sink_.add(numbers, boundary);
     }
 
-    /// The fourth corner of the lattice's tetrahedron across the face opposite to corner k: the mirror image of
-    /// that corner at the middle of the long edge which the face has.
+    /// The fourth corner of the lattice's tetrahedron across the face opposite to corner k: the mirror image
+    /// of that corner at the middle of the long edge which the face has.
     static Place beyond(const std::array<Place, 4>& tet, std::size_t k) {
         const Place &p = tet[k], &a = tet[k < 2 ? 2 : 0], &b = tet[k < 2 ? 3 : 1];
         const int half = p.kind == corner ? 1 : -1;  // slots of centres stand for half more
@@ -201,7 +205,8 @@ class BlockFiller {
     double cut_part(const Place& p, const Place& q) const {
         const auto [owner, edge_class] = edge_of(p, q);
         const SurfaceBlock* s = points_.surface(points_.table().near(b_, owner.x, owner.y, owner.z));
-        const int rank = s->cut[static_cast<std::size_t>(edge_class)].rank(owner.x & 7, owner.y & 7, owner.z & 7);
+        const int rank =
+            s->cut[static_cast<std::size_t>(edge_class)].rank(owner.x & 7, owner.y & 7, owner.z & 7);
         const double part = s->parts[static_cast<std::size_t>(rank)];
         return owner.x == p.x && owner.y == p.y && owner.z == p.z && owner.kind == p.kind ? part : 1 - part;
     }
@@ -214,7 +219,8 @@ class BlockFiller {
             for (int y = 0; y < dim; ++y)
                 for (std::uint64_t row = cells_.row8(x, y) & ~cells_.row8(x + by[0], y + by[1], by[2]); row;
                      row &= row - 1)
-                    half_pyramids({0, Coord(8 * origin[0] + x, 8 * origin[1] + y, 8 * origin[2] + __builtin_ctzll(row))},
+                    half_pyramids({0, Coord(8 * origin[0] + x, 8 * origin[1] + y,
+                                            8 * origin[2] + __builtin_ctzll(row))},
                                   axis, step);
     }
 
@@ -223,7 +229,8 @@ class BlockFiller {
     VertexId middle(const Octant& o) const {
         if (!Sink::numbers) return 0;
         const Coord c = o.origin(), at = points_.table()[b_].at;
-        if (o.level == 0) return vertices_.at(b_, centre, c[0] - 8 * at[0], c[1] - 8 * at[1], c[2] - 8 * at[2]);
+        if (o.level == 0)
+            return vertices_.at(b_, centre, c[0] - 8 * at[0], c[1] - 8 * at[1], c[2] - 8 * at[2]);
         return vertices_.corner_at(b_, c.offsetBy(1 << (o.level - 1)));
     }
     VertexId number(const Coord& c) const { return Sink::numbers ? vertices_.corner_at(b_, c) : 0; }
@@ -263,8 +270,8 @@ class BlockFiller {
             }
     }
 
-    /// Four tetrahedra between the middles of two equal leaves and the sides of their common face; a side that
-    /// smaller leaves beside it have divided divides its tetrahedron.
+    /// Four tetrahedra between the middles of two equal leaves and the sides of their common face; a side
+    /// that smaller leaves beside it have divided divides its tetrahedron.
     void equal_face(const Octant& leaf, const Octant& next, int axis) {
         const std::array<Coord, 4> p = face(leaf, axis, 1);
         const VertexId c = middle(leaf), d = middle(next);
@@ -291,8 +298,8 @@ class BlockFiller {
         }
     }
 
-    /// Two tetrahedra on a face with a leaf of twice the size at its other side; they meet in the diagonal from
-    /// the middle of the larger face.
+    /// Two tetrahedra on a face with a leaf of twice the size at its other side; they meet in the diagonal
+    /// from the middle of the larger face.
     void half_pyramids(const Octant& leaf, int axis, int step) {
         const std::array<Coord, 4> p = face(leaf, axis, step);
         const VertexId c = middle(leaf);
@@ -340,10 +347,11 @@ void check_angles(const TetMesh& mesh, std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
         const Tetrahedron& v = mesh.tets[t];
         if (!within_bounds(mesh.points[v[0]], mesh.points[v[1]], mesh.points[v[2]], mesh.points[v[3]]))
-            throw NumericalError(fmt::format(
-                "tetrahedron {} of isosurface stuffing has an angle out of the bounds it promises: a fault of "
-                "vdbgeo, please report it",
-                t));
+            throw NumericalError(
+                fmt::format("tetrahedron {} of isosurface stuffing has an angle out of the bounds it "
+                            "promises: a fault of "
+                            "vdbgeo, please report it",
+                            t));
     }
 }
 

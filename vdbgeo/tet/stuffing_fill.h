@@ -49,8 +49,8 @@ class VertexTable {
 /// The cells of a block, and around it, that are of level 0.
 Halo cells_of_level_0(const SnappedLattice& points, const Octree& octree, std::size_t b);
 
-/// Makes the mesh. Throws NumericalError for more than max_tets tetrahedra or 2^32 − 1 vertices, before the mesh
-/// takes memory, and where an angle is out of bounds.
+/// Makes the mesh. Throws NumericalError for more than max_tets tetrahedra or 2^32 − 1 vertices, before the
+/// mesh takes memory, and where an angle is out of bounds.
 TetMesh fill(const Lattice& lattice, const SnappedLattice& points, const Octree& octree,
              std::uint64_t max_tets, const Progress& progress);
 

@@ -46,7 +46,8 @@ Lattice::Lattice(const DensityMap& map, double isovalue, double cell)
       to_index_(cell_ * map.frame.axes.inverse()),
       from_index_(map.frame.axes / cell_) {}
 
-/// How far along `step` (in index units) the box reaches, 0…1: where its border is met, the field jumps there.
+/// How far along `step` (in index units) the box reaches, 0…1: where its border is met, the field jumps
+/// there.
 double Lattice::leave_box(const Vec3d& in, const Vec3d& step) const {
     double least = 1;
     if (bounded_)
@@ -57,15 +58,16 @@ double Lattice::leave_box(const Vec3d& in, const Vec3d& step) const {
     return std::max(least, 0.0);
 }
 
-/// Inverse quadratic interpolation, else the secant, in a bracket that at least every fourth step halves: three
-/// or four values where the field is smooth, and an end for any field. Done where the value is 10^-11 of what it
-/// is at the ends, or the bracket 6·10^-11 of the edge.
+/// Inverse quadratic interpolation, else the secant, in a bracket that at least every fourth step halves:
+/// three or four values where the field is smooth, and an end for any field. Done where the value is 10^-11
+/// of what it is at the ends, or the bracket 6·10^-11 of the edge.
 double Lattice::root(const Vec3d& in, const Vec3d& out) const {
     constexpr double tolerance = 0x1p-34, relative = 1e-11;
     constexpr int most = 160;
     const Vec3d start = to_index_ * in, step = to_index_ * (out - in);
     const double sign = turned_ ? -1 : 1;
-    const auto f = [&](double t) { return sign * field_(start + t * step); };
+    TrilinearField::Cursor cursor;
+    const auto f = [&](double t) { return sign * field_(start + t * step, cursor); };
     double a = 0, fa = f(0), b = 1, fb = f(1);  // f(a) ≥ 0 > f(b)
     if (!(fa > 0)) return 0;
     if (!std::isfinite(fb)) {
@@ -80,7 +82,8 @@ double Lattice::root(const Vec3d& in, const Vec3d& out) const {
         if (k % 4 != 3 && std::isfinite(fa) && std::isfinite(fb)) {
             double s = (a * fb - b * fa) / (fb - fa);
             if (std::isfinite(fc) && fc != fa && fc != fb) {
-                const double q = a * fb * fc / ((fa - fb) * (fa - fc)) + b * fa * fc / ((fb - fa) * (fb - fc)) +
+                const double q = a * fb * fc / ((fa - fb) * (fa - fc)) +
+                                 b * fa * fc / ((fb - fa) * (fb - fc)) +
                                  c * fa * fb / ((fc - fa) * (fc - fb));
                 if (q > a && q < b) s = q;
             }

@@ -41,6 +41,14 @@ inline std::uint64_t row_of(const Bits& bits, int x, int y) {
     return bits[static_cast<std::size_t>(x)] >> 8 * y & 0xFF;
 }
 
+/// How many bits are set; in place, since the compiler calls a function for it where it may not take for
+/// granted that the CPU can count.
+inline int count_bits(std::uint64_t v) {
+    v -= v >> 1 & 0x5555555555555555ull;
+    v = (v & 0x3333333333333333ull) + (v >> 2 & 0x3333333333333333ull);
+    return static_cast<int>(((v + (v >> 4)) & 0x0F0F0F0F0F0F0F0Full) * 0x0101010101010101ull >> 56);
+}
+
 /// Bits that know how many are set before each.
 struct RankedBits {
     Bits bits{};
@@ -50,14 +58,14 @@ struct RankedBits {
     int rank_from(int first) {
         for (std::size_t x = 0; x < bits.size(); ++x) {
             before[x] = static_cast<std::uint16_t>(first);
-            first += __builtin_popcountll(bits[x]);
+            first += count_bits(bits[x]);
         }
         return first;
     }
     int rank(int x, int y, int z) const {
         const std::uint64_t below = (std::uint64_t{1} << bit_of(y, z)) - 1;
         const auto w = static_cast<std::size_t>(x);
-        return before[w] + __builtin_popcountll(bits[w] & below);
+        return before[w] + count_bits(bits[w] & below);
     }
 };
 
@@ -102,14 +110,21 @@ class Lattice {
     Vec3d to_index(const Vec3d& lattice) const { return to_index_ * lattice; }
     const Mat3d& from_index() const { return from_index_; }
 
-    /// Above or equal 0 inside. Where an unbounded grid's background is inside, everything is turned over, and
-    /// the solid is the rest.
+    /// Above or equal 0 inside. Where an unbounded grid's background is inside, everything is turned over,
+    /// and the solid is the rest.
     double operator()(const Vec3d& lattice) const {
-        const double v = field_(to_index_ * lattice);
+        TrilinearField::Cursor cursor;
+        return (*this)(lattice, cursor);
+    }
+    double operator()(const Vec3d& lattice, TrilinearField::Cursor& cursor) const {
+        const double v = field_(to_index_ * lattice, cursor);
         if (!turned_) return v;
         return v >= 0 ? -std::max(v, std::numeric_limits<double>::min()) : -v;
     }
     bool inside(const Vec3d& lattice) const { return (*this)(lattice) >= 0; }
+    bool inside(const Vec3d& lattice, TrilinearField::Cursor& cursor) const {
+        return (*this)(lattice, cursor) >= 0;
+    }
 
     /// Where the field is 0 on the way from `in` (inside) to `out` (outside), as a fraction of it.
     double root(const Vec3d& in, const Vec3d& out) const;

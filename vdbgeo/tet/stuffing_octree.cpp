@@ -18,7 +18,8 @@ Octree::Octree(const SnappedLattice& points, int coarsening, const Progress& pro
             }
             const Coord& at = table_[b].at;
             for (int k = 0; k < 8; ++k)
-                if (surrounded({2, Coord(2 * at[0] + (k >> 2), 2 * at[1] + (k >> 1 & 1), 2 * at[2] + (k & 1))}))
+                if (surrounded(
+                        {2, Coord(2 * at[0] + (k >> 2), 2 * at[1] + (k >> 1 & 1), 2 * at[2] + (k & 1))}))
                     nodes_[b].level_2 = static_cast<std::uint8_t>(nodes_[b].level_2 | 1 << k);
         });
     for (int level = 3; level <= coarsening; ++level) {
@@ -43,8 +44,8 @@ std::uint64_t Octree::merge_cells(const SnappedLattice& points, std::size_t b) c
             for (int k = 0; k < 4; ++k) {
                 const int i = x + (k & 1), j = y + (k >> 1);
                 std::uint64_t held = centres.row8(i, j) | centres.row8(i, j, 1) | centres.row8(i, j, -1) |
-                                     centres.row8(i + 1, j) | centres.row8(i - 1, j) | centres.row8(i, j + 1) |
-                                     centres.row8(i, j - 1);
+                                     centres.row8(i + 1, j) | centres.row8(i - 1, j) |
+                                     centres.row8(i, j + 1) | centres.row8(i, j - 1);
                 for (int c = 0; c < 8; ++c) held |= corners.row8(i + (c & 1), j + (c >> 1 & 1), c >> 2);
                 row &= inside.row8(i, j) & ~held;
             }
@@ -76,7 +77,8 @@ void Octree::merge_blocks(int level) {
     std::vector<std::uint8_t> merged(nodes_.size(), 0);
     parallel_for(nodes_.size(), 16, [&](std::size_t b) {
         const Coord& at = table_[b].at;
-        if (((at[0] | at[1] | at[2]) & rest) != 0 || (level == 3 ? nodes_[b].level_2 != 0xFF : nodes_[b].top < level - 1))
+        if (((at[0] | at[1] | at[2]) & rest) != 0 ||
+            (level == 3 ? nodes_[b].level_2 != 0xFF : nodes_[b].top < level - 1))
             return;
         merged[b] = (level == 3 && all_around(b, [](const Node& n) { return n.level_2 == 0xFF; })) ||
                     surrounded({level, Coord(at[0] >> shift, at[1] >> shift, at[2] >> shift)});
@@ -102,11 +104,13 @@ bool Octree::whole(const Octant& octant) const {
     }
     if (octant.level == 0) return true;
     const int down = 3 - octant.level, low = (1 << down) - 1;
-    const std::int32_t b = table_.find(Coord(octant.at[0] >> down, octant.at[1] >> down, octant.at[2] >> down));
+    const std::int32_t b =
+        table_.find(Coord(octant.at[0] >> down, octant.at[1] >> down, octant.at[2] >> down));
     if (b < 0) return false;
     const int x = octant.at[0] & low, y = octant.at[1] & low, z = octant.at[2] & low;
     const Node& node = nodes_[static_cast<std::size_t>(b)];
-    return octant.level == 1 ? node.level_1 >> (16 * x + 4 * y + z) & 1 : node.level_2 >> (4 * x + 2 * y + z) & 1;
+    return octant.level == 1 ? node.level_1 >> (16 * x + 4 * y + z) & 1
+                             : node.level_2 >> (4 * x + 2 * y + z) & 1;
 }
 
 }  // namespace vdbgeo::stuffing

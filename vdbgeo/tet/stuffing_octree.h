@@ -26,19 +26,19 @@ struct Octant {
 
 /// Which cubes of 2^level cells are not divided. Cells at a point with a crossed edge are all of level 0: the
 /// eight around a corner, and around a centre its own and the six that share a face with it; so every
-/// tetrahedron at such a point is one of the uniform lattice. All others are as large as balance allows: leaves
-/// that share a face or an edge differ by one level at most.
+/// tetrahedron at such a point is one of the uniform lattice. All others are as large as balance allows:
+/// leaves that share a face or an edge differ by one level at most.
 class Octree {
  public:
     Octree(const SnappedLattice& points, int coarsening, const Progress& progress);
 
-    /// Whether the octant lies in a leaf of its level or above. False where nothing is inside; at level 0 true
-    /// for every cell that is not held at level 0, too.
+    /// Whether the octant lies in a leaf of its level or above. False where nothing is inside; at level 0
+    /// true for every cell that is not held at level 0, too.
     bool whole(const Octant& octant) const;
     bool is_leaf(const Octant& octant) const { return whole(octant) && !whole(octant.parent()); }
 
-    /// Octants of level 1 and 2 in block b that lie in a leaf of their level or above: bit 16·x + 4·y + z, and
-    /// 4·x + 2·y + z.
+    /// Octants of level 1 and 2 in block b that lie in a leaf of their level or above: bit 16·x + 4·y + z,
+    /// and 4·x + 2·y + z.
     std::uint64_t level_1(std::size_t b) const { return nodes_[b].level_1; }
     std::uint8_t level_2(std::size_t b) const { return nodes_[b].level_2; }
     /// Level of the leaf that covers the block, or 0.
@@ -80,7 +80,8 @@ void Octree::for_each_leaf(std::size_t b, const F& f) const {
         return;
     }
     for (int k = 0; k < 8; ++k)
-        if (node.level_2 >> k & 1) f(Octant{2, Coord(2 * at[0] + (k >> 2), 2 * at[1] + (k >> 1 & 1), 2 * at[2] + (k & 1))});
+        if (node.level_2 >> k & 1)
+            f(Octant{2, Coord(2 * at[0] + (k >> 2), 2 * at[1] + (k >> 1 & 1), 2 * at[2] + (k & 1))});
     for (std::uint64_t left = node.level_1; left; left &= left - 1) {
         const int bit = __builtin_ctzll(left), x = bit >> 4, y = bit >> 2 & 3, z = bit & 3;
         if (node.level_2 >> ((x >> 1) * 4 + (y >> 1) * 2 + (z >> 1)) & 1) continue;

@@ -42,7 +42,8 @@ std::array<std::array<IncidentEdge, 14>, 2> make_incident_edges() {
             if (kind == centre)
                 edges[n++] = {corner, up, {}, 6 + b, true, direction};
             else
-                edges[n++] = {centre, {-up[0], -up[1], -up[2]}, {-up[0], -up[1], -up[2]}, 6 + b, false, -direction};
+                edges[n++] = {centre,    {-up[0], -up[1], -up[2]}, {-up[0], -up[1], -up[2]}, 6 + b, false,
+                              -direction};
         }
     }
     return out;
@@ -99,6 +100,7 @@ void SnappedLattice::sample(const Lattice& lattice, const std::vector<MarkedBloc
     parallel_for(marked.size(), 4, [&](std::size_t m) {
         const Coord at = block_of(marked[m].key);
         auto& inside = inside_[m];
+        TrilinearField::Cursor cursor;
         for (int brick = 0; brick < 64; ++brick) {
             const int x0 = 2 * (brick >> 4), y0 = 2 * (brick >> 2 & 3), z0 = 2 * (brick & 3);
             const bool all = marked[m].bricks >> brick & 1;
@@ -106,7 +108,7 @@ void SnappedLattice::sample(const Lattice& lattice, const std::vector<MarkedBloc
             for (int k = 0; k < 8; ++k) {
                 const int x = x0 + (k >> 2), y = y0 + (k >> 1 & 1), z = z0 + (k & 1);
                 for (const Kind kind : {corner, centre})
-                    if (!all || lattice.inside(point(at, x, y, z, kind)))
+                    if (!all || lattice.inside(point(at, x, y, z, kind), cursor))
                         inside[static_cast<std::size_t>(kind)][static_cast<std::size_t>(x)] |=
                             std::uint64_t{1} << bit_of(y, z);
             }
@@ -244,7 +246,8 @@ void SnappedLattice::snap(const Progress& progress) {
     finish_snaps();
 }
 
-/// What the rules say of a point: undecided where neither applies. With `best`: the nearest allowed cut point.
+/// What the rules say of a point: undecided where neither applies. With `best`: the nearest allowed cut
+/// point.
 std::uint8_t SnappedLattice::judge(const SurfaceBlock& s, int slot, Snap* best) const {
     const Kind kind = kind_of(slot);
     const auto [x, y, z] = place_of(slot);

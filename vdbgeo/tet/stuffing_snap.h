@@ -1,5 +1,5 @@
-// Which points of the lattice are inside, where the surface cuts its edges, and which points are snapped to it.
-// For isosurface_stuffing; nothing outside this folder needs it.
+// Which points of the lattice are inside, where the surface cuts its edges, and which points are snapped to
+// it. For isosurface_stuffing; nothing outside this folder needs it.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ struct Snap {
 /// A block with ends of crossed edges.
 struct SurfaceBlock {
     std::size_t block = 0;
-    std::array<Bits, 2> critical{};           ///< points with a crossed edge, before any was snapped
+    std::array<Bits, 2> critical{};            ///< points with a crossed edge, before any was snapped
     std::array<RankedBits, edge_classes> cut;  ///< edges with a cut point, at last those that remain
     std::vector<double> parts;                 ///< where, from the owner's end, in the order of `cut`
     std::array<Bits, 2> zero{};                ///< points that were snapped
@@ -36,7 +36,7 @@ struct IncidentEdge {
     std::array<int, 3> far;  ///< slot of that point
     std::array<int, 3> owner;
     int edge_class;
-    bool first;      ///< whether the point is the end that owns the edge
+    bool first;       ///< whether the point is the end that owns the edge
     Vec3d direction;  ///< to the other end
 };
 const std::array<IncidentEdge, 14>& incident_edges(Kind kind);

@@ -34,11 +34,13 @@ class Maker {
             add({0, 1, 2, 3});
         } else if (in.size() == 1) {
             Corners tet{};
-            for (int k = 0; k < 4; ++k) tet[static_cast<std::size_t>(k)] = sign(k) == 0 ? cut(in[0], k) : lattice(k);
+            for (int k = 0; k < 4; ++k)
+                tet[static_cast<std::size_t>(k)] = sign(k) == 0 ? cut(in[0], k) : lattice(k);
             add(tet);
         } else if (in.size() == 3) {
             const int m = out[0];
-            prism({lattice(in[0]), lattice(in[1]), lattice(in[2])}, {cut(in[0], m), cut(in[1], m), cut(in[2], m)});
+            prism({lattice(in[0]), lattice(in[1]), lattice(in[2])},
+                  {cut(in[0], m), cut(in[1], m), cut(in[2], m)});
         } else if (zero.size() == 1) {
             const int p = in[0], q = in[1], m = out[0];
             const std::uint8_t apex = lattice(zero[0]), pm = cut(p, m), qm = cut(q, m);
@@ -70,8 +72,8 @@ class Maker {
         return even_ ^ b ^ d ^ back;
     }
 
-    /// Whether the diagonal of a quadrilateral on a face runs from lattice point p to the cut point on the edge
-    /// from `q` to the point outside.
+    /// Whether the diagonal of a quadrilateral on a face runs from lattice point p to the cut point on the
+    /// edge from `q` to the point outside.
     bool from(int p, int q, int m) const {
         if (is_long(p, q)) return is_even(p, m);
         const bool far = far_[static_cast<std::size_t>(m / 2)];  // m is an end of the long one
@@ -116,7 +118,8 @@ class Maker {
         const auto at = [&](std::uint8_t v) -> Vec3d {
             if (v < 4) return shape[v];
             const auto& edge = tet_edges[static_cast<std::size_t>(v - 4)];
-            return 0.5 * (shape[static_cast<std::size_t>(edge[0])] + shape[static_cast<std::size_t>(edge[1])]);
+            return 0.5 *
+                   (shape[static_cast<std::size_t>(edge[0])] + shape[static_cast<std::size_t>(edge[1])]);
         };
         if (tet_determinant(at(tet[0]), at(tet[1]), at(tet[2]), at(tet[3])) < 0) std::swap(tet[2], tet[3]);
         result_.tets[static_cast<std::size_t>(result_.count++)] = tet;
@@ -147,8 +150,8 @@ const Table table = make_all();
 }  // namespace
 
 const Stencil& stencil(Sign a, Sign b, Sign c, Sign d, bool even, bool far_ab, bool far_cd) {
-    return table[place(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c), static_cast<int>(d), even,
-                       far_ab, far_cd)];
+    return table[place(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c), static_cast<int>(d),
+                       even, far_ab, far_cd)];
 }
 
 }  // namespace vdbgeo::stuffing

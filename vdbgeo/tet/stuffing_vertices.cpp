@@ -71,12 +71,14 @@ void VertexTable::mark_cells(std::size_t b, Marks& marks) const {
                 if (s) {
                     std::uint64_t near = 0;
                     for (const IncidentEdge& e : incident_edges(kind))
-                        near |= plus[static_cast<std::size_t>(e.other)].row8(x + e.far[0], y + e.far[1], e.far[2]);
+                        near |= plus[static_cast<std::size_t>(e.other)].row8(x + e.far[0], y + e.far[1],
+                                                                             e.far[2]);
                     row |= row_of(s->zero[static_cast<std::size_t>(kind)], x, y) & near;
                 }
                 word |= row << 8 * y;
             }
-            if (word) marks[16 * b + 8 * static_cast<std::size_t>(kind) + static_cast<std::size_t>(x)] |= word;
+            if (word)
+                marks[16 * b + 8 * static_cast<std::size_t>(kind) + static_cast<std::size_t>(x)] |= word;
         }
 }
 
@@ -84,8 +86,8 @@ void VertexTable::mark_cells(std::size_t b, Marks& marks) const {
 void VertexTable::mark_leaves(std::size_t b, Marks& marks) const {
     const auto mark = [&](const Coord& c) {
         const auto n = static_cast<std::size_t>(block_near(b, c));
-        marks[16 * n + static_cast<std::size_t>(c[0] & 7)].fetch_or(std::uint64_t{1} << bit_of(c[1] & 7, c[2] & 7),
-                                                                    std::memory_order_relaxed);
+        marks[16 * n + static_cast<std::size_t>(c[0] & 7)].fetch_or(
+            std::uint64_t{1} << bit_of(c[1] & 7, c[2] & 7), std::memory_order_relaxed);
     };
     octree_.for_each_leaf(b, [&](const Octant& leaf) {
         const Coord origin = leaf.origin();
@@ -105,29 +107,34 @@ std::int32_t VertexTable::block_near(std::size_t b, const Coord& cell) const {
 
 bool VertexTable::has_corner(std::size_t near_block, const Coord& c) const {
     const std::int32_t b = block_near(near_block, c);
-    return b >= 0 && test(numbers_[static_cast<std::size_t>(b)].used[corner].bits, c[0] & 7, c[1] & 7, c[2] & 7);
+    return b >= 0 &&
+           test(numbers_[static_cast<std::size_t>(b)].used[corner].bits, c[0] & 7, c[1] & 7, c[2] & 7);
 }
 
 VertexId VertexTable::corner_at(std::size_t near_block, const Coord& c) const {
     const Numbers& n = numbers_[static_cast<std::size_t>(block_near(near_block, c))];
-    return static_cast<VertexId>(n.first + static_cast<std::uint64_t>(n.used[corner].rank(c[0] & 7, c[1] & 7, c[2] & 7)));
+    return static_cast<VertexId>(
+        n.first + static_cast<std::uint64_t>(n.used[corner].rank(c[0] & 7, c[1] & 7, c[2] & 7)));
 }
 
 VertexId VertexTable::at(std::size_t b, Kind kind, int x, int y, int z) const {
     const Numbers& n = numbers_[static_cast<std::size_t>(points_.table().near(b, x, y, z))];
     return static_cast<VertexId>(
-        n.first + static_cast<std::uint64_t>(n.used[static_cast<std::size_t>(kind)].rank(x & 7, y & 7, z & 7)));
+        n.first +
+        static_cast<std::uint64_t>(n.used[static_cast<std::size_t>(kind)].rank(x & 7, y & 7, z & 7)));
 }
 
 bool VertexTable::used(std::size_t b, Kind kind, int x, int y, int z) const {
     const std::int32_t n = points_.table().near(b, x, y, z);
-    return n >= 0 && test(numbers_[static_cast<std::size_t>(n)].used[static_cast<std::size_t>(kind)].bits, x & 7, y & 7, z & 7);
+    return n >= 0 && test(numbers_[static_cast<std::size_t>(n)].used[static_cast<std::size_t>(kind)].bits,
+                          x & 7, y & 7, z & 7);
 }
 
 VertexId VertexTable::cut_at(std::size_t b, int edge_class, int x, int y, int z) const {
     const std::int32_t block = points_.table().near(b, x, y, z);
     const Numbers& n = numbers_[static_cast<std::size_t>(block)];
-    const int rank = points_.surface(block)->cut[static_cast<std::size_t>(edge_class)].rank(x & 7, y & 7, z & 7);
+    const int rank =
+        points_.surface(block)->cut[static_cast<std::size_t>(edge_class)].rank(x & 7, y & 7, z & 7);
     return static_cast<VertexId>(n.first + static_cast<std::uint64_t>(n.cuts + rank));
 }
 

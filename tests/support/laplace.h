@@ -71,6 +71,7 @@ inline LaplaceSolution solve_laplace(const TetMesh& mesh,
         else
             number[v] = unknowns++;
     }
+    if (unknowns == 0) throw std::runtime_error("the mesh has no points within");
     const Eigen::VectorXd known = all * u;
     Eigen::VectorXd right(unknowns);
     std::vector<Eigen::Triplet<double>> entries;

@@ -295,17 +295,20 @@ TEST_F(Tetgen, FillsASpecimen) {
     EXPECT_LT(largest, 176);
 }
 
-TEST_F(Tetgen, FillsTheRealSurface) {
+TEST_F(Tetgen, FillsThePiecesOfARealMap) {
     VDBGEO_NEEDS_DATA("mainmastseg/MAP_m4A.mrc.gz");
     if (!have_delaunay()) GTEST_SKIP() << "this build has no CGAL";
-    const MapFile file = read_map(test::data_folder() / "mainmastseg/MAP_m4A.mrc.gz");
+    MapReadOptions reading;
+    reading.crop = Crop{{70, 70, 70}, {110, 110, 110}};
+    const MapFile file = read_map(test::data_folder() / "mainmastseg/MAP_m4A.mrc.gz", reading);
     DelaunaySurfaceOptions options;
     options.isovalue = 0.7;
-    options.radius = options.distance = 1.6;
     const TriMesh surface = delaunay_surface(file.map, options);
     const TetMesh mesh = tetgen_tetrahedra(surface);
     test::expect_sound(mesh);
+    test::expect_kept(mesh, surface);
     expect_volume(mesh, surface);
+    EXPECT_GT(mesh.tets.size(), 10'000u);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace vdbgeo {
 namespace {
 
-constexpr std::size_t rays_a_space = 3;
+constexpr std::size_t rays_a_space = 8;
 
 struct Ray {
     std::size_t space;
@@ -63,9 +63,9 @@ void find_ends(const TriMesh& mesh, std::vector<Ray>& rays) {
 
 }  // namespace
 
-std::vector<std::optional<SeedPoint>> seed_points(const TriMesh& mesh,
-                                                  const std::vector<std::vector<FaceSide>>& spaces) {
-    std::vector<std::optional<SeedPoint>> seeds(spaces.size());
+std::vector<std::vector<SeedPoint>> seed_points(const TriMesh& mesh,
+                                                const std::vector<std::vector<FaceSide>>& spaces) {
+    std::vector<std::vector<SeedPoint>> seeds(spaces.size());
     std::vector<Ray> rays = choose_rays(mesh, spaces);
     if (rays.empty()) return seeds;
     find_ends(mesh, rays);
@@ -76,9 +76,11 @@ std::vector<std::optional<SeedPoint>> seed_points(const TriMesh& mesh,
         middle.x() = static_cast<float>((double(ray.start.x()) + ray.end) / 2);
         const Vec3d point = middle.cast<double>();
         const double clearance = std::sqrt(tree.nearest(point).squared_distance);
-        std::optional<SeedPoint>& seed = seeds[ray.space];
-        if (clearance > (seed ? seed->clearance : 0)) seed = SeedPoint{point, clearance};
+        if (clearance > 0) seeds[ray.space].push_back({point, clearance});
     }
+    for (std::vector<SeedPoint>& of_space : seeds)
+        std::stable_sort(of_space.begin(), of_space.end(),
+                         [](const SeedPoint& a, const SeedPoint& b) { return a.clearance > b.clearance; });
     return seeds;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "vdbgeo/core/tri_mesh.h"
@@ -17,14 +16,15 @@ struct SeedPoint {
     double clearance = 0;         ///< distance to the nearest face
 };
 
-/// For each space, given by sides of faces that lie in it, a point of it: the middle of the way along +x from
-/// the middle of one of its faces to the next face of the mesh; of three such faces with large projections
-/// onto the yz plane that with the largest clearance. Nothing for a space where no ray meets another face, or
-/// the middle lies on the surface.
+/// For each space, given by sides of faces that lie in it, some points of it, those with the largest
+/// clearance first: the middles of the ways along +x from the middles of up to eight of its faces, with large
+/// projections onto the yz plane, to the next faces of the mesh. None for a space where no ray meets another
+/// face, or all middles lie on the surface. Rays start at floats: beside faces of a few units in the last
+/// place points may lie in another space, which their winding numbers tell.
 ///
-/// Cost: O(n + sides), and three queries of the nearest face a space.
-std::vector<std::optional<SeedPoint>> seed_points(const TriMesh& mesh,
-                                                  const std::vector<std::vector<FaceSide>>& spaces);
+/// Cost: O(n + sides), and eight queries of the nearest face a space.
+std::vector<std::vector<SeedPoint>> seed_points(const TriMesh& mesh,
+                                                const std::vector<std::vector<FaceSide>>& spaces);
 
 /// For each point how many more times the ray along +x leaves a solid than it enters one: 1 inside of a
 /// solid, 0 outside of all. The coordinates are those of floats.

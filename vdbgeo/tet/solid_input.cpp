@@ -263,38 +263,59 @@ void add_enclosed_voids(const Sides& sides, std::vector<std::vector<FaceSide>>& 
     }
 }
 
+struct Seed {
+    Vec3d point;
+    int winding;
+};
+
+/// A point of each space: of those with the winding number that it should have, 1 in the first `solid` spaces
+/// and 0 in the others, the one farthest from the surface.
+std::vector<Seed> choose_seeds(const TriMesh& surface, const Sides& sides,
+                               const std::vector<std::vector<FaceSide>>& spaces, std::size_t solid,
+                               const std::string& stage) {
+    const auto found = seed_points(sides.mesh, spaces);
+    std::vector<Vec3d> points;
+    for (const auto& of_space : found)
+        for (const SeedPoint& seed : of_space) points.push_back(seed.point);
+    const std::vector<int> windings = winding_numbers(surface, points);
+    std::vector<Seed> seeds;
+    for (std::size_t s = 0, first = 0; s < spaces.size(); first += found[s++].size()) {
+        if (found[s].empty())
+            throw InvalidInput(
+                fmt::format("{}: there is no point between the faces about {}: they are too "
+                            "close to each other",
+                            stage, place(middle(sides.mesh, spaces[s].front() / 2))));
+        const int wanted = s < solid ? 1 : 0;
+        std::size_t best = first;
+        while (best < first + found[s].size() && windings[best] != wanted) ++best;
+        if (best == first + found[s].size()) best = first;
+        seeds.push_back({points[best], windings[best]});
+    }
+    return seeds;
+}
+
 /// Sets the points inside the regions and holes, and checks that solids do not overlap.
 void set_seeds(const TriMesh& surface, const Sides& sides, const Pieces& pieces, const std::string& stage,
                SolidInput& input) {
     const std::size_t count = pieces.solid.size();
     auto spaces = sides_of_pieces(sides, count);
     add_enclosed_voids(sides, spaces);
-    const auto seeds = seed_points(sides.mesh, spaces);
-    std::vector<Vec3d> points;
-    for (std::size_t s = 0; s < spaces.size(); ++s) {
-        if (!seeds[s])
-            throw InvalidInput(
-                fmt::format("{}: there is no point between the faces about {}: they are too "
-                            "close to each other",
-                            stage, place(middle(sides.mesh, spaces[s].front() / 2))));
-        points.push_back(seeds[s]->point);
-    }
-    const std::vector<int> windings = winding_numbers(surface, points);
+    const std::vector<Seed> seeds = choose_seeds(surface, sides, spaces, count, stage);
     for (std::size_t p = 0; p < count; ++p) {
-        if (windings[p] > 1)
-            throw InvalidInput(
-                fmt::format("{}: a solid lies in another one about {}; turn its surface inward where it is a "
-                            "cavity, or give "
-                            "both a label",
-                            stage, place(points[p])));
-        if (windings[p] < 1)
-            throw InvalidInput(
-                fmt::format("{} needs pieces that are turned outward, or inward in a shell: the "
-                            "one about {} is inside out; try repair",
-                            stage, place(points[p])));
-        if (!pieces.cavity[p]) input.regions[static_cast<std::size_t>(pieces.solid[p])].inside = points[p];
+        const auto& [point, winding] = seeds[p];
+        if (winding > 1)
+            throw InvalidInput(fmt::format(
+                "{}: a solid lies in another one about {}; turn its surface inward where it is a cavity, or "
+                "give both a label",
+                stage, place(point)));
+        if (winding < 1)
+            throw InvalidInput(fmt::format(
+                "{} needs pieces that are turned outward, or inward in a shell: the one about {} is inside "
+                "out; try repair",
+                stage, place(point)));
+        if (!pieces.cavity[p]) input.regions[static_cast<std::size_t>(pieces.solid[p])].inside = point;
     }
-    input.holes.assign(points.begin() + static_cast<std::ptrdiff_t>(count), points.end());
+    for (std::size_t s = count; s < seeds.size(); ++s) input.holes.push_back(seeds[s].point);
 }
 
 }  // namespace

@@ -31,6 +31,19 @@ std::vector<VertexId> vertices_of(const TetStore& store, const std::vector<std::
     return out;
 }
 
+/// Bad tetrahedra none of whose corners a move of its own would make better.
+std::vector<std::uint32_t> stuck(const TetStore& store, const std::vector<std::uint32_t>& tried) {
+    std::vector<std::uint32_t> tets = store.worse_than(1);
+    const auto goes_on = [&](std::uint32_t t) {
+        const Tetrahedron& c = store.tet(t);
+        return std::any_of(c.begin(), c.end(), [&](VertexId v) {
+            return store.freedom(v) != VertexFreedom::fixed && store.changed(v) >= tried[v];
+        });
+    };
+    tets.erase(std::remove_if(tets.begin(), tets.end(), goes_on), tets.end());
+    return tets;
+}
+
 }  // namespace
 
 void TetOptimizeOptions::check() const {
@@ -67,7 +80,8 @@ TetOptimizeReport optimize_tets(TetMesh& mesh, const TetOptimizeOptions& options
                                             options.onto_surface, vertices_tried, epoch, part.part(0, 0.8));
         if (options.flips && slides) flips = flip_tets(store, store.worse_than(1), flips_tried, epoch);
         part.report(0.9);
-        moves += move_patches(store, store.worse_than(1), options.onto_surface, patches_tried, epoch);
+        moves +=
+            move_patches(store, stuck(store, vertices_tried), options.onto_surface, patches_tried, epoch);
         part.report(1);
         ++report.rounds;
         report.moves += moves;

@@ -80,8 +80,9 @@ TetOptimizeReport optimize_tets(TetMesh& mesh, const TetOptimizeOptions& options
                                             options.onto_surface, vertices_tried, epoch, part.part(0, 0.8));
         if (options.flips && slides) flips = flip_tets(store, store.worse_than(1), flips_tried, epoch);
         part.report(0.9);
-        moves +=
-            move_patches(store, stuck(store, vertices_tried), options.onto_surface, patches_tried, epoch);
+        // Of the few that are left on a sliding surface all, else only those that cannot go on alone.
+        moves += move_patches(store, slides ? store.worse_than(1) : stuck(store, vertices_tried),
+                              options.onto_surface, patches_tried, epoch);
         part.report(1);
         ++report.rounds;
         report.moves += moves;

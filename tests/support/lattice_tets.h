@@ -22,9 +22,9 @@ using Implicit = std::function<double(const Vec3d&)>;
 /// worse than by the published stencils.
 class LatticeTets {
  public:
-    /// Cubes of side h in the box from −half to half along each axis.
-    LatticeTets(Implicit inside, double half, double h)
-        : inside_(std::move(inside)), n_(int(std::ceil(half / h)) + 1), h_(h) {}
+    /// Cubes of side h in the box from −extent to extent along each axis.
+    LatticeTets(Implicit inside, double extent, double h)
+        : inside_(std::move(inside)), n_(int(std::ceil(extent / h)) + 1), h_(h) {}
 
     TetMesh make() {
         const int m = 2 * n_ + 1;
@@ -174,8 +174,8 @@ class LatticeTets {
     TetMesh mesh_;
 };
 
-inline TetMesh lattice_tets(const Implicit& inside, double half, double h) {
-    return LatticeTets(inside, half, h).make();
+inline TetMesh lattice_tets(const Implicit& inside, double extent, double h) {
+    return LatticeTets(inside, extent, h).make();
 }
 
 }  // namespace vdbgeo::test

@@ -8,9 +8,14 @@
 #include <random>
 #include <set>
 
+#include "converters/map_file.h"
+#include "tests/support/data.h"
 #include "tests/support/lattice_tets.h"
+#include "tests/support/maps.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/tet_adjacency.h"
+#include "vdbgeo/tet/isosurface_stuffing.h"
+#include "vdbgeo/tet/map_projection.h"
 
 using namespace vdbgeo;
 using namespace vdbgeo::test;
@@ -18,9 +23,18 @@ using namespace vdbgeo::test;
 namespace {
 
 double ball(const Vec3d& p) { return 1 - p.norm(); }
+double bumpy(const Vec3d& p) {
+    return ball(p) + 0.05 * std::sin(9 * p.x()) * std::sin(8 * p.y() + 1) * std::sin(10 * p.z() + 2);
+}
 double torus(const Vec3d& p) { return 0.3 - std::hypot(std::hypot(p.x(), p.y()) - 0.7, p.z()); }
 
 std::optional<Vec3d> onto_ball(const Vec3d& p) { return p.normalized(); }
+std::optional<Vec3d> onto_bumpy(const Vec3d& p) {  // along the ray from the centre
+    const Vec3d direction = p.normalized();
+    double in = 0.5, out = 1.5;
+    while (out - in > 1e-14) (bumpy(0.5 * (in + out) * direction) > 0 ? in : out) = 0.5 * (in + out);
+    return Vec3d(in * direction);
+}
 std::optional<Vec3d> onto_torus(const Vec3d& p) {
     const Vec3d centre = 0.7 * Vec3d(p.x(), p.y(), 0).normalized();
     return Vec3d(centre + 0.3 * (p - centre).normalized());
@@ -167,16 +181,16 @@ TEST(TetOptimize, NoRoundsAndGoodMeshesGiveTheInputBack) {
     EXPECT_TRUE(empty.empty());
 }
 
-TEST(TetOptimize, BringsASlidingBallAndTorusWithinTheBounds) {
+TEST(TetOptimize, BringsSlidingSurfacesWithinTheBounds) {
     struct Case {
         double (*inside)(const Vec3d&);
         std::optional<Vec3d> (*onto)(const Vec3d&);
     };
-    for (const Case& c : {Case{ball, onto_ball}, Case{torus, onto_torus}}) {
-        TetMesh mesh = lattice_tets(c.inside, 1.1, 0.1);
+    for (const Case& c : {Case{bumpy, onto_bumpy}, Case{torus, onto_torus}}) {
+        TetMesh mesh = lattice_tets(c.inside, 1.2, 0.06);
         const Angles before = angles_of(mesh);
         ASSERT_EQ(before.turned_over, 0u);
-        ASSERT_GT(before.outside, 10u);
+        ASSERT_GT(before.outside, 100u);
         TetOptimizeOptions options;
         options.onto_surface = c.onto;
         const std::size_t points = mesh.points.size(), faces = mesh.faces.size();
@@ -232,7 +246,7 @@ TEST(TetOptimize, TheWorstNeverGetsWorse) {
     double worth = angles_of(start).worth;
     ASSERT_LT(worth, 0.3);
     std::uint64_t steps = 0;
-    for (int rounds = 1; rounds < 8; ++rounds) {
+    for (int rounds = 1; rounds < 5; ++rounds) {
         TetMesh mesh = start;
         TetOptimizeOptions options;
         options.rounds = rounds;
@@ -243,7 +257,7 @@ TEST(TetOptimize, TheWorstNeverGetsWorse) {
         steps = report.moves + report.flips;
         worth = now;
     }
-    EXPECT_GT(worth, 0.7);
+    EXPECT_GT(worth, 0.6);
 }
 
 TEST(TetOptimize, KeepsRegionsAndTheFacesBetweenThem) {
@@ -350,4 +364,36 @@ TEST(TetOptimize, RefusesWhatIsNoMesh) {
         EXPECT_THROW(optimize_tets(mesh, options), InvalidInput);
     }
     EXPECT_TRUE(same_bytes(mesh, good));
+}
+
+TEST(TetOptimize, BringsAStuffedMapWithinTheBounds) {
+    // Smooth lumps of the size of a few voxels, cut by the box.
+    const Frame frame = centred_frame(40, 1.3);
+    const DensityMap map = map_from_function({40, 40, 40}, frame, [](const Vec3d& p) {
+        return std::sin(0.45 * p.x()) * std::cos(0.4 * p.y() + 0.3) + std::sin(0.5 * p.z() + 0.2 * p.x());
+    });
+    TetMesh mesh = isosurface_stuffing(map, 0.3);
+    const Angles before = angles_of(mesh);
+    ASSERT_GT(before.outside, 100u);
+    TetOptimizeOptions options;
+    options.onto_surface = map_projection(map, 0.3);
+    optimize_tets(mesh, options);
+    const Angles after = angles_of(mesh);
+    EXPECT_EQ(after.outside, 0u);
+    EXPECT_EQ(after.turned_over, 0u);
+    const Vec3d corner = Vec3d::Constant(0.5 * 39 * 1.3 + 1e-9);
+    for (const Vec3d& p : mesh.points) ASSERT_TRUE((p.cwiseAbs().array() <= corner.array()).all());
+}
+
+TEST(TetOptimize, BringsARealMapWithinTheBounds) {
+    VDBGEO_NEEDS_DATA("mainmastseg/MAP_m4A.mrc.gz");
+    const DensityMap map = read_map(data_folder() / "mainmastseg/MAP_m4A.mrc.gz").map;
+    TetMesh mesh = isosurface_stuffing(map, 0.7);
+    ASSERT_GT(angles_of(mesh).outside, 1000u);
+    TetOptimizeOptions options;
+    options.onto_surface = map_projection(map, 0.7);
+    optimize_tets(mesh, options);
+    const Angles after = angles_of(mesh);
+    EXPECT_EQ(after.outside, 0u);
+    EXPECT_EQ(after.turned_over, 0u);
 }

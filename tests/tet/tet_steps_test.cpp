@@ -4,10 +4,12 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/lattice_tets.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/tet_adjacency.h"
 #include "vdbgeo/tet/tet_flips.h"
 #include "vdbgeo/tet/tet_moves.h"
+#include "vdbgeo/tet/tet_patches.h"
 
 using namespace vdbgeo;
 
@@ -262,4 +264,50 @@ TEST(TetMoves, NoPlaceOfAFineGridIsMuchBetter) {
         EXPECT_EQ(move_vertices(store, {0}, {}, tried, epoch, {}), 0u);
         EXPECT_EQ(tried[0], at);  // not tried again while nothing changed
     }
+}
+
+TEST(TetPatches, GoOnWhereSingleMovesAreStuck) {
+    TetMesh mesh = test::lattice_tets([](const Vec3d& p) { return 1 - p.norm(); }, 1.1, 0.25);
+    // Squeezed: everything is bad, and the boundary does not move.
+    for (Vec3d& p : mesh.points) p.x() *= 0.35;
+    TetStore store(mesh, bounds, false);
+    std::vector<VertexId> all(mesh.points.size());
+    for (VertexId v = 0; v < all.size(); ++v) all[v] = v;
+    std::vector<std::uint32_t> tried(all.size(), 0), patches_tried;
+    std::uint32_t epoch = 0;
+    for (int i = 0; i < 100 && move_vertices(store, all, {}, tried, epoch, {}) > 0; ++i) {
+    }
+    std::vector<double> before;
+    for (std::uint32_t t = 0; t < store.slot_count(); ++t) before.push_back(store.worth(t));
+    const std::vector<std::uint32_t> stuck = store.worse_than(1);
+    ASSERT_GT(stuck.size(), 10u);
+    EXPECT_GT(move_patches(store, stuck, {}, patches_tried, epoch), 5u);
+    // Tetrahedra may get worse, but not to less than the worst was.
+    double worst = 1e30, sum = 0;
+    for (std::uint32_t t = 0; t < store.slot_count(); ++t) {
+        EXPECT_NEAR(store.worth(t), store.worth_of(store.tet(t)), 0);
+        EXPECT_GT(store.worth(t), 0);
+        worst = std::min(worst, store.worth(t));
+        sum += store.worth(t) != before[t];
+    }
+    EXPECT_GE(worst, *std::min_element(before.begin(), before.end()));
+    EXPECT_GT(sum, 20);
+    for (const Triangle& f : mesh.faces)
+        for (const VertexId v : f) EXPECT_EQ(store.point(v), mesh.points[v]);
+}
+
+TEST(TetPatches, MovesTwoVerticesWithTheSurface) {
+    // One tetrahedron with all corners on a ball: only together they can make it better than by a little.
+    const auto onto_ball = [](const Vec3d& p) -> std::optional<Vec3d> { return p.normalized(); };
+    TetMesh mesh = mesh_of({Vec3d(1, 0.2, 0).normalized(), Vec3d(-1, 0.2, 0).normalized(),
+                            Vec3d(0, -0.2, 1).normalized(), Vec3d(0, -0.2, -1).normalized()},
+                           {{0, 1, 2, 3}});
+    TetStore store(mesh, bounds, true);
+    std::vector<std::uint32_t> tried;
+    std::uint32_t epoch = 0;
+    const double before = store.worth(0);
+    ASSERT_LT(before, 1);
+    for (int i = 0; i < 20; ++i) move_patches(store, {0}, onto_ball, tried, epoch);
+    EXPECT_GT(store.worth(0), 1.44);
+    for (VertexId v = 0; v < 4; ++v) EXPECT_NEAR(store.point(v).norm(), 1, 1e-15);
 }

@@ -16,9 +16,9 @@ struct Slope {
     Vector gradient;
 };
 
-/// The d that maximises min_i (value_i + gradient_i·d) − |d|²/2τ: d = τ Σ λ_i gradient_i, with the λ of the dual
-/// (λ ≥ 0, Σ λ = 1) found pair by pair. `predicted` is the minimum there; it is short of the best one by 5 % of
-/// the gain at most, or as far as 40 pairs come.
+/// The d that maximises min_i (value_i + gradient_i·d) − |d|²/2τ: d = τ Σ λ_i gradient_i, with the λ of the
+/// dual (λ ≥ 0, Σ λ = 1) found pair by pair. `predicted` is the minimum there; it is short of the best one by
+/// 5 % of the gain at most, or as far as 40 pairs come.
 template <class Vector>
 Vector model_step(const std::vector<Slope<Vector>>& slopes, double tau, std::vector<double>& lambda,
                   double& predicted) {
@@ -59,13 +59,12 @@ struct AscentBuffers {
 };
 
 /// Raises the least function of a problem by a proximal bundle method (Kiwiel 1985, doi:10.1007/BFb0074500):
-/// each step is that of the linear model, taken where the true least value rises, and shortened where not. The
-/// problem has
+/// each step is that of the linear model, taken where the true least value rises, and shortened where not.
+/// The problem has
 ///
-///   worth(x, floor)      the square of the least function at x, or anything not above `floor` where it is not
-///   slopes(x, cut, out)  the functions at x whose value is less than `cut`
-///   place(x, d)          where a step d from x leads, if anywhere; it may bend and shorten it
-///   size()               the scale of its steps
+///   worth(x, floor)      the square of the least function at x, or anything not above `floor` where it is
+///   not slopes(x, cut, out)  the functions at x whose value is less than `cut` place(x, d)          where a
+///   step d from x leads, if anywhere; it may bend and shorten it size()               the scale of its steps
 ///
 /// Ends where the least function is `enough`, where the model promises less than 0.1 %, and after 10 steps. x
 /// and worth are those at the end; whether there was a step.
@@ -75,7 +74,8 @@ bool ascend(Problem& problem, double enough, Vector& x, double& worth, AscentBuf
     constexpr double least_gain = 1e-3, wide = 0.7, first_step = 0.2, shortest_step = 1e-4;
     double tau = 0;
     bool moved = false, fresh = true;
-    for (int step = 0, trial = 0; step < max_steps && trial < max_trials && worth < enough * enough; ++trial) {
+    for (int step = 0, trial = 0; step < max_steps && trial < max_trials && worth < enough * enough;
+         ++trial) {
         const double value = std::sqrt(worth);
         if (fresh) problem.slopes(x, value + wide, buffers.slopes);
         if (buffers.slopes.empty()) break;

@@ -10,16 +10,11 @@
 
 namespace vdbgeo {
 
-/// Moves each of `vertices` (sorted, none twice) that may move to where the worst tetrahedron around it is
-/// better, and nothing where there is no such place. `tried[v]` is when it was tried in vain last: it is left
-/// alone while nothing around it changed since. `epoch` counts on. Returns how many moved.
-///
-/// What is maximised, min over the star's angles of q (see DihedralBounds), is a minimum of smooth functions.
-/// Each step maximises the minimum of their linear parts less |d|²/2τ over moves d (a proximal bundle method:
-/// Kiwiel 1985, doi:10.1007/BFb0074500), is taken where the true worst is better, and shortened where not.
-/// Boundary vertices move in their tangent plane and back onto the surface.
-///
-/// Vertices of one colour of a greedy colouring share no tetrahedron and are moved at once.
+/// Moves each of `vertices` (sorted, none twice) that may move to where the worst angle around it is better
+/// (see ascend and DihedralBounds), and those not for which there is no such place. Boundary vertices move in
+/// their tangent plane and back onto the surface. `tried[v]` is when v was tried in vain last: it is left
+/// alone while nothing around it changed since; `epoch` counts on. Vertices of one colour of a greedy
+/// colouring share no tetrahedron and are moved at once. Returns how many moved.
 std::uint64_t move_vertices(TetStore& store, const std::vector<VertexId>& vertices,
                             const SurfaceProjection& onto_surface, std::vector<std::uint32_t>& tried,
                             std::uint32_t& epoch, const Progress& progress);

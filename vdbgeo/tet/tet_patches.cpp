@@ -36,7 +36,9 @@ class Patch {
     double size() const { return size_; }
 
  private:
-    static Vec3d part(const Places& x, std::size_t i) { return x.segment<3>(3 * static_cast<Eigen::Index>(i)); }
+    static Vec3d part(const Places& x, std::size_t i) {
+        return x.segment<3>(3 * static_cast<Eigen::Index>(i));
+    }
     Vec3d point(VertexId v, const Places& x) const {
         const std::size_t i = index(v);
         return i < count() ? part(x, i) : store_.point(v);
@@ -45,7 +47,8 @@ class Patch {
         return static_cast<std::size_t>(std::find(corners_.begin(), corners_.end(), v) - corners_.begin());
     }
     double stretch(const Places& x) const;
-    void tet_slopes(const Tetrahedron& tet, const Places& x, double cut, std::vector<Slope<Places>>& out) const;
+    void tet_slopes(const Tetrahedron& tet, const Places& x, double cut,
+                    std::vector<Slope<Places>>& out) const;
 
     const TetStore& store_;
     const SurfaceProjection& onto_surface_;
@@ -69,8 +72,9 @@ bool Patch::gather(std::uint32_t tet) {
     for (const std::uint32_t t : tets_)
         for (const auto& [i, j] : tet_edges) {
             const Tetrahedron& c = store_.tet(t);
-            sum += (store_.point(c[static_cast<std::size_t>(i)]) - store_.point(c[static_cast<std::size_t>(j)]))
-                       .squaredNorm();
+            sum +=
+                (store_.point(c[static_cast<std::size_t>(i)]) - store_.point(c[static_cast<std::size_t>(j)]))
+                    .squaredNorm();
         }
     size_ = std::sqrt(sum / (6 * static_cast<double>(tets_.size())));
     most_stretch_ = std::max(stretch_limit * stretch_limit, stretch(start()));
@@ -88,7 +92,8 @@ double Patch::stretch(const Places& x) const {
     double most = 0;
     for (const std::uint32_t t : tets_) {
         const Tetrahedron& c = store_.tet(t);
-        most = std::max(most, radius_edge_squared(point(c[0], x), point(c[1], x), point(c[2], x), point(c[3], x)));
+        most = std::max(most,
+                        radius_edge_squared(point(c[0], x), point(c[1], x), point(c[2], x), point(c[3], x)));
     }
     return most;
 }
@@ -97,8 +102,8 @@ double Patch::worth(const Places& x, double floor) {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < tets_.size(); ++i) {
         const Tetrahedron& c = store_.tet(tets_[i]);
-        least = std::min(least, dihedral_worth(store_.bounds(), point(c[0], x), point(c[1], x), point(c[2], x),
-                                               point(c[3], x)));
+        least = std::min(least, dihedral_worth(store_.bounds(), point(c[0], x), point(c[1], x),
+                                               point(c[2], x), point(c[3], x)));
         if (least <= floor) return least;
     }
     return stretch(x) <= most_stretch_ ? least : 0;
@@ -162,8 +167,8 @@ std::optional<Places> Patch::place(const Places& x, const Places& d) const {
     }
     for (const VertexId v : corners_)
         if (store_.freedom(v) == VertexFreedom::surface &&
-            !surface_holds(store_, 
-                v, [&](VertexId w) { return point(w, x); }, [&](VertexId w) { return point(w, to); }))
+            !surface_holds(
+                store_, v, [&](VertexId w) { return point(w, x); }, [&](VertexId w) { return point(w, to); }))
             return std::nullopt;
     return to;
 }

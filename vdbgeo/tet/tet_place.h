@@ -44,8 +44,8 @@ bool surface_holds(const TetStore& store, VertexId v, const From& from, const To
     return good;
 }
 
-/// Where a step d from x leads that is at most `longest`: on the surface for vertices of it. Nothing where the
-/// projection finds nothing, or a place that is much farther away.
+/// Where a step d from x leads that is at most `longest`: on the surface for vertices of it. Nothing where
+/// the projection finds nothing, or a place that is much farther away.
 inline std::optional<Vec3d> step_of(VertexFreedom freedom, const Vec3d& x, Vec3d d, double longest,
                                     const SurfaceProjection& onto_surface) {
     const double length = d.norm();

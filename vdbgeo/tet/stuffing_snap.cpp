@@ -186,8 +186,8 @@ void SnappedLattice::find_cuts(SurfaceBlock& s, const Lattice& lattice) const {
 ///   (1) no cut point that remains is too near to an end of its edge,
 ///   (2) a point is snapped to a cut point that was too near, on an edge whose other end is not snapped.
 /// A cut point remains where neither end is snapped. Any order of snapping point by point leads to (1): that
-/// is the paper's algorithm. With (2) in addition no two snapped points come towards each other, and the
-/// worst tetrahedron is better (stuffing_stencils.h).
+/// is the paper's algorithm. With (2) in addition no two snapped points come
+/// towards each other, which are the worst tetrahedra otherwise.
 ///
 /// Let v → w where the cut point of edge vw is too near to v. Both hold for a kernel of this graph: v is
 /// snapped if and only if some w with v → w is not. Edges cross the surface, so all arcs run between inside

@@ -70,9 +70,9 @@ Arguments parse(int count, char** words) {
 }
 
 double peak_rss() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return 1024.0 * static_cast<double>(usage.ru_maxrss);
+    rusage used{};
+    getrusage(RUSAGE_SELF, &used);
+    return 1024.0 * static_cast<double>(used.ru_maxrss);
 }
 
 double median(std::vector<double> values) {
@@ -95,7 +95,8 @@ void run(const Arguments& args) {
         double mesh_bytes = 0, faces = 0;
         const double before = peak_rss();
         std::vector<Contender> contenders;
-        contenders.push_back({"vdbgeo", [&] {
+        contenders.push_back({"vdbgeo",
+                              [&] {
                                   const auto mesh = std::make_shared<TetMesh>(
                                       isosurface_stuffing(*in.all, isovalue, options));
                                   faces = static_cast<double>(mesh->faces.size());
@@ -103,7 +104,9 @@ void run(const Arguments& args) {
                                                                    mesh->points.size() * sizeof(Vec3d)) +
                                                faces * (sizeof(Triangle) + sizeof(mesh->face_regions[0]));
                                   return Output{mesh->tets.size(), mesh->points.size(), mesh};
-                              }});
+                              },
+                              {},
+                              {}});
         race(contenders, args.repeat);
         const Contender& c = contenders[0];
         const auto tets = static_cast<double>(c.last.triangles);

@@ -42,11 +42,12 @@ struct StuffingOptions {
 /// edges, where the lattice does not resolve the surface: in walls and gaps of about a cell (noise is full of
 /// them). Parts thinner than a cell may be lost or joined. Tetrahedra are all of region 1, faces are set.
 ///
-/// The same bytes for any number of threads. Cost: in proportion to the tetrahedra and the crossed voxels:
-/// one to seven million tetrahedra a second and thread, the thicker the body the more; memory that of the
-/// mesh and some 10 bytes a tetrahedron for a time. Throws InvalidInput for an option out of range;
-/// NumericalError where nothing crosses the isovalue, where the cell is too large for any lattice point to be
-/// inside, for a cell so small that the map is wider than 2^24 cells, and for more than max_tets; Cancelled.
+/// The same bytes for any number of threads. Cost: in proportion to the tetrahedra and the crossed voxels; a
+/// CPU makes 12 million tetrahedra a second in a thick uniform body, 5 graded, 2 in thin walls, less than 1
+/// in noise. Memory: that of the mesh and a few bytes a tetrahedron for a time. Throws InvalidInput for an
+/// option out of range; NumericalError where nothing crosses the isovalue, where the cell is too large for
+/// any lattice point to be inside, for a cell so small that the map is wider than 2^24 cells, and for more
+/// than max_tets; Cancelled.
 TetMesh isosurface_stuffing(const DensityMap& map, double isovalue, const StuffingOptions& options = {},
                             const Progress& progress = {});
 

@@ -186,8 +186,8 @@ void SnappedLattice::find_cuts(SurfaceBlock& s, const Lattice& lattice) const {
 ///   (1) no cut point that remains is too near to an end of its edge,
 ///   (2) a point is snapped to a cut point that was too near, on an edge whose other end is not snapped.
 /// A cut point remains where neither end is snapped. Any order of snapping point by point leads to (1): that
-/// is the paper's algorithm. With (2) in addition no two snapped points come towards each other, and the
-/// worst tetrahedron is better (stuffing_stencils.h).
+/// is the paper's algorithm. With (2) in addition no two snapped points come
+/// towards each other, which are the worst tetrahedra otherwise.
 ///
 /// Let v → w where the cut point of edge vw is too near to v. Both hold for a kernel of this graph: v is
 /// snapped if and only if some w with v → w is not. Edges cross the surface, so all arcs run between inside
@@ -219,21 +219,21 @@ void SnappedLattice::snap(const Progress& progress) {
                 verdict[s][k] = judge(surfaces_[s], open[s][k], nullptr);
         });
         changed = fixed_order_reduce(
-            surfaces_.size(), 8, false,
-            [&](std::size_t begin, std::size_t end) {
-                bool any_decided = false;
-                for (std::size_t s = begin; s < end; ++s) {
-                    std::size_t left = 0;
-                    for (std::size_t k = 0; k < open[s].size(); ++k) {
-                        state_[s][open[s][k]] = verdict[s][k];
-                        if (verdict[s][k] == undecided) open[s][left++] = open[s][k];
-                    }
-                    any_decided |= left < open[s].size();
-                    open[s].resize(left);
-                }
-                return any_decided;
-            },
-            [](bool& sum, bool part) { sum |= part; });
+                      surfaces_.size(), 8, std::size_t{0},
+                      [&](std::size_t begin, std::size_t end) {
+                          std::size_t decided = 0;
+                          for (std::size_t s = begin; s < end; ++s) {
+                              std::size_t left = 0;
+                              for (std::size_t k = 0; k < open[s].size(); ++k) {
+                                  state_[s][open[s][k]] = verdict[s][k];
+                                  if (verdict[s][k] == undecided) open[s][left++] = open[s][k];
+                              }
+                              decided += open[s].size() - left;
+                              open[s].resize(left);
+                          }
+                          return decided;
+                      },
+                      [](std::size_t& sum, std::size_t part) { sum += part; }) > 0;
     }
     parallel_for(surfaces_.size(), 8, [&](std::size_t s) {
         const auto& inside = inside_[static_cast<std::size_t>(table_[surfaces_[s].block].marked)];

@@ -156,10 +156,10 @@ void VtkWriter::begin(const std::string& section, const std::string& attributes)
 }
 
 void VtkWriter::declare(const char* type, const std::string& name, int components, std::uint64_t bytes) {
+    // One component is what goes without saying: some readers make columns of what is said to have one.
     text_ += fmt::format(
-        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
-        "offset=\"{}\"/>\n",
-        type, escaped(name), components, offset_);
+        "<DataArray type=\"{}\" Name=\"{}\" {}format=\"appended\" offset=\"{}\"/>\n", type, escaped(name),
+        components == 1 ? "" : fmt::format("NumberOfComponents=\"{}\" ", components), offset_);
     offset_ += 8 + bytes;
 }
 

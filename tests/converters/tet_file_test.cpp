@@ -308,7 +308,12 @@ TEST(TetFile, VtuOfTrianglesStaysASurface) {
     }
     for (const char* name : {"t.msh", "t.mesh", "t.ele"}) {
         write_tets(two_regions(1), folder / name);
-        EXPECT_THROW(read_mesh(folder / name), InvalidInput);
+        try {
+            read_mesh(folder / name);
+            ADD_FAILURE() << name;
+        } catch (const InvalidInput& error) {
+            EXPECT_NE(std::string(error.what()).find("a file of tetrahedra"), std::string::npos);
+        }
     }
 }
 

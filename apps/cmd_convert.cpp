@@ -1,4 +1,4 @@
-// vdbgeo convert (also mrc2vdb and vdb2mrc): map, grid and mesh files into each other.
+// vdbgeo convert (also mrc2vdb and vdb2mrc): map, grid, mesh and tetrahedra files into each other.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -11,6 +11,7 @@
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
 #include "converters/nanovdb_file.h"
+#include "converters/tet_file.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/volume/placement.h"
 
@@ -28,6 +29,9 @@ struct ConvertOptions {
 };
 
 void convert_mesh(const ConvertOptions& o, Session& session) {
+    if (is_tet_ending(o.out) && !is_mesh_ending(o.out))
+        throw UsageError(
+            fmt::format("{}: a surface is filled with tetrahedra by vdbgeo tetrahedralize", o.out));
     if (!is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a mesh becomes one of {}", o.out, mesh_endings_text()));
     const auto progress = session.stage("converting");
@@ -35,6 +39,28 @@ void convert_mesh(const ConvertOptions& o, Session& session) {
     write_mesh(mesh, o.out, {}, progress.part(0.5, 1));
     session.result(
         {{"in", o.in}, {"out", o.out}, {"vertices", mesh.points.size()}, {"faces", mesh.triangles.size()}});
+}
+
+/// Tetrahedra into another file of tetrahedra, or the surface around them into a mesh file.
+void convert_tets(const ConvertOptions& o, Session& session) {
+    if (!is_tet_ending(o.out) && !is_mesh_ending(o.out))
+        throw UsageError(fmt::format("{}: tetrahedra become one of {}; their boundary one of {}", o.out,
+                                     tet_endings_text(), mesh_endings_text()));
+    const auto progress = session.stage("converting");
+    const TetMesh mesh = read_tets(o.in, progress.part(0, 0.5));
+    Json j{{"in", o.in}, {"out", o.out}};
+    if (is_tet_ending(o.out)) {
+        write_tets(mesh, o.out, progress.part(0.5, 1));
+        j.update({{"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}});
+        const bool lost = !mesh.vertex_properties.empty() || !mesh.tet_properties.empty();
+        if (lost && !has_ending(o.out, ".vtu"))
+            session.warn(fmt::format("{}: properties are left out: only .vtu has them", o.out));
+    } else {
+        const TriMesh surface = boundary_surface(mesh);
+        write_mesh(surface, o.out, {}, progress.part(0.5, 1));
+        j.update({{"vertices", surface.points.size()}, {"faces", surface.triangles.size()}});
+    }
+    session.result(j);
 }
 
 /// What rounding cost, where values were rounded.
@@ -188,11 +214,14 @@ void run_convert(ConvertOptions o, Session& session) {
     o.in = o.files.front();
     o.out = o.files.back();
     const bool series = o.files.size() > 2 || o.all_volumes;
-    if (series && (is_mesh_input(o.in) || o.out == "-"))
+    if (series && (is_mesh_input(o.in) || is_tet_ending(o.in) || o.out == "-"))
         throw UsageError("a series is made of maps, as numbered files");
+    if (holds_tets(o.in)) return convert_tets(o, session);
     if (is_mesh_input(o.in)) return convert_mesh(o, session);
     if (is_mesh_ending(o.out))
         throw UsageError(fmt::format("{}: a map becomes a mesh at an isovalue: use vdbgeo surface", o.out));
+    if (is_tet_ending(o.out))
+        throw UsageError(fmt::format("{}: a map is filled with tetrahedra by vdbgeo tetrahedralize", o.out));
     check_map_output(o.out, session);
     if (o.scene.wanted() && !is_vdb_ending(o.out) && !is_nanovdb_ending(o.out))
         throw UsageError(fmt::format("{}: the grids of a scene go into a .vdb or .nvdb file", o.out));
@@ -204,15 +233,17 @@ void run_convert(ConvertOptions o, Session& session) {
 }  // namespace
 
 Command convert_command() {
-    return {"convert", "Convert between map (MRC, CCP4), grid (VDB) and mesh files, by their endings",
+    return {"convert",
+            "Convert between map (MRC, CCP4), grid (VDB), mesh and tetrahedra files, by their endings",
             "  vdbgeo convert emd_1080.map emd_1080.vdb --threshold 1.5sigma", [](CLI::App& app) {
                 auto o = std::make_shared<ConvertOptions>();
-                app.add_option(
-                       "files", o->files,
-                       "Map, grid or mesh file (- reads a map from a pipe), and last the file to write: "
-                       ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; " +
-                           mesh_endings_text() +
-                           "; - is an MRC map for a pipe. Several maps make a series: OUT_0001.vdb and so on")
+                app.add_option("files", o->files,
+                               "Map, grid, mesh or tetrahedra file (- reads a map from a pipe), and last the "
+                               "file to write: "
+                               ".vdb .nvdb; .mrc .map .ccp4 .rec, also with .gz; " +
+                                   mesh_endings_text() + "; of tetrahedra " + tet_endings_text() +
+                                   ", or a mesh of their boundary; - is an MRC map for a pipe. Several maps "
+                                   "make a series: OUT_0001.vdb and so on")
                     ->required()
                     ->expected(2, -1)
                     ->type_name("IN... OUT");

@@ -5,10 +5,13 @@
 #include "apps/flags.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/tet_reports.h"
 #include "converters/mesh_file.h"
 #include "converters/strip_source.h"
+#include "converters/tet_file.h"
 #include "vdbgeo/measure/isovalue_table.h"
 #include "vdbgeo/measure/self_intersections.h"
+#include "vdbgeo/tet/tet_quality.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -20,7 +23,36 @@ struct InfoOptions {
     MapFlags map;
 };
 
-Json describe(const std::string& file, const InfoOptions& options, Session& session) {
+/// Tetrahedra, and the surface around them.
+Json describe_tets(const std::string& file, std::vector<std::string>& lines, Session& session) {
+    const auto progress = session.stage("reading");
+    const TetMesh mesh = read_tets(file, progress.part(0, 0.5));
+    const TetQuality quality = naming(file, [&] { return measure_tets(mesh, progress.part(0.5, 0.8)); });
+    const MeshMeasures boundary = measure_mesh(boundary_surface(mesh), progress.part(0.8, 1));
+    session.end_stage();
+    Json j{{"file", file}, {"kind", "tets"}};
+    lines = {fmt::format("file        {}", file), "kind        tetrahedra"};
+    j.update(tets_json(quality));
+    j["interface_faces"] = mesh.faces.size() - boundary.faces;
+    j["boundary"] = measures_json(boundary);
+    for (std::string& line : tets_text(quality)) lines.push_back(std::move(line));
+    lines.push_back(fmt::format("boundary    {} faces in {} pieces, {:.6g} Å²", boundary.faces,
+                                boundary.components, boundary.area_A2));
+    if (boundary.faces < mesh.faces.size())
+        lines.push_back(
+            fmt::format("interfaces  {} faces between regions", mesh.faces.size() - boundary.faces));
+    std::vector<std::string> names;
+    for (const auto* all : {&mesh.vertex_properties, &mesh.tet_properties})
+        for (const MeshProperty& p : *all) names.push_back(p.name);
+    j["properties"] = names;
+    if (!names.empty()) lines.push_back(fmt::format("properties  {}", fmt::join(names, ", ")));
+    return j;
+}
+
+/// What a file holds, as JSON and as lines.
+Json describe(const std::string& file, const InfoOptions& options, std::vector<std::string>& lines,
+              Session& session) {
+    if (holds_tets(file)) return describe_tets(file, lines, session);
     Json j{{"file", file}};
     const auto progress = session.stage("reading");
     if (is_vdb_file(file) || is_vdb_ending(file)) {
@@ -51,6 +83,7 @@ Json describe(const std::string& file, const InfoOptions& options, Session& sess
         if (options.validate) j["departures"] = validate_mrc(file);
     }
     session.end_stage();
+    lines = as_lines(j);
     return j;
 }
 
@@ -86,7 +119,7 @@ void check_info(const InfoOptions& options) {
         throw UsageError("--plot draws the isovalues of one map");
     if (options.isovalues)
         for (const std::string& file : options.files)
-            if (file == "-" || is_mesh_input(file))
+            if (file == "-" || is_mesh_input(file) || is_tet_ending(file))
                 throw UsageError(fmt::format("{}: --isovalues is of maps and grids in files", file));
 }
 
@@ -97,8 +130,8 @@ void run_info(const InfoOptions& options, Session& session) {
             throw UsageError("-: --validate reads a file more than once, which a pipe does not allow");
     Json all = Json::array();
     for (const std::string& file : options.files) {
-        Json j = describe(file, options, session);
-        std::vector<std::string> lines = as_lines(j);
+        std::vector<std::string> lines;
+        Json j = describe(file, options, lines, session);
         if (options.validate && j.contains("departures") && j["departures"].empty())
             lines.emplace_back("departures from MRC2014: none");
         if (options.isovalues) j["isovalues"] = isovalue_rows(file, options, lines, session);
@@ -113,12 +146,13 @@ void run_info(const InfoOptions& options, Session& session) {
 }  // namespace
 
 Command info_command() {
-    return {"info", "Header, statistics and topology of maps, grids and meshes",
+    return {"info", "Header, statistics and topology of maps, grids, meshes and tetrahedra",
             "  vdbgeo info emd_1080.map --validate\n"
             "  vdbgeo info emd_1080.map --isovalues --plot levels.png",
             [](CLI::App& app) {
                 auto o = std::make_shared<InfoOptions>();
-                app.add_option("files", o->files, "Maps (MRC, CCP4), VDB grids or meshes")->required();
+                app.add_option("files", o->files, "Maps (MRC, CCP4), VDB grids, meshes or tetrahedra")
+                    ->required();
                 app.add_flag("--validate", o->validate, "List every departure of a map file from MRC2014");
                 app.add_flag("--isovalues", o->isovalues,
                              "A table of a map: isovalue, enclosed volume, area and pieces of the surface");

@@ -75,7 +75,7 @@ void GmshSource::need_room(std::uint64_t entries, std::uint64_t values, std::uin
     // in text a digit and a blank at least; the last blank may be missing
     const std::uint64_t left = binary_ ? bytes_.size() - at_ : text_.remaining() + 1;
     const std::uint64_t each = binary_ ? bytes : 2;
-    if (values > left || (values > 0 && entries > left / (values * each)))
+    if (entries > 0 && values > 0 && (values > left || entries > left / (values * each)))
         fail(fmt::format("{}: {} entries of {} numbers, found {} bytes", what, entries, values, left));
 }
 

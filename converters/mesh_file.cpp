@@ -7,6 +7,7 @@
 
 #include "converters/mesh_formats.h"
 #include "converters/mesh_properties.h"
+#include "converters/tet_file.h"
 #include "vdbgeo/core/errors.h"
 
 namespace vdbgeo {
@@ -53,6 +54,10 @@ TriMesh read_any(const MappedFile& file, const std::filesystem::path& path, cons
     if (!stl && is_vtk_xml(file.bytes())) return read_vtk_xml(file, progress);
     if (!stl && is_vtk_legacy(file.bytes())) return read_vtk_legacy(file, progress);
     if (!stl && is_off(file.bytes())) return read_off(file, progress);
+    if (!format && is_tet_ending(path))
+        throw InvalidInput(fmt::format(
+            "{}: a file of tetrahedra, not of a surface; vdbgeo convert makes one of their boundary",
+            file.name()));
     if (!format)
         throw InvalidInput(fmt::format(
             "{}: not a mesh: the content is none of PLY, OFF, glTF and VTK, and the ending none of {}",

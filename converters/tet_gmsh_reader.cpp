@@ -231,7 +231,7 @@ class Reader {
             const std::uint64_t own = in_.size("elements of a block");
             if (own > n - seen) in_.fail(fmt::format("more than the {} elements that are announced", n));
             seen += own;
-            in_.need_room(own, 1 + kind.nodes, (1 + kind.nodes) * bytes / (1 + kind.nodes), "elements");
+            in_.need_room(own, 1 + kind.nodes, bytes, "elements");
             if (!kind.tetrahedron()) {
                 in_.pass_over(own * (1 + kind.nodes), bytes, "elements");
                 soup_.surfaces += kind.dimension == 2 ? own : 0;

@@ -49,8 +49,9 @@ class Reader {
         header();
         std::string_view word = text_.next_word();
         while (!word.empty() && word != "End") word = section(word);
-        if (word.empty() && bytes_.back() != '\n' && bytes_.back() != '\r')
-            text_.fail("the file ends within a line, and without the word End");
+        // Some programs leave the word End out; then a file may have been cut.
+        if (word.empty() && (soup_.tets.empty() || (bytes_.back() != '\n' && bytes_.back() != '\r')))
+            text_.fail("the file ends without the word End");
         if (!vertices_) text_.fail("no section Vertices");
         for (const Tetrahedron& t : soup_.tets)
             for (const VertexId v : t)

@@ -37,7 +37,7 @@ class EntryReader {
     /// Compares `entries` of `words` numbers each with the file's length.
     void check_room(std::uint64_t entries, std::uint64_t words) const {
         const std::uint64_t left = text_.remaining() + 1;
-        if (words > left || entries > left / (2 * words))
+        if (entries > 0 && (words > left || entries > left / (2 * words)))
             text_.fail(
                 fmt::format("{} entries of {} numbers, found {} bytes", entries, words, text_.remaining()));
     }

@@ -94,7 +94,8 @@ class Scanner {
         const std::size_t close = tag.empty ? tag.end : text_.find("</DataArray", tag.end);
         if (close == text_.npos) fail(tag, "the file ends within an array");
         const auto type = vtk_type(tag.attribute("type").value_or(""));
-        if (out_.pieces.empty() || section.empty() || !type) return close;  // of the file itself, or of strings
+        if (out_.pieces.empty() || section.empty() || !type)
+            return close;  // of the file itself, or of strings
         VtkArray array;
         array.name = tag.attribute("Name").value_or("");
         array.type = *type;
@@ -155,10 +156,10 @@ void VtkWriter::begin(const std::string& section, const std::string& attributes)
 }
 
 void VtkWriter::declare(const char* type, const std::string& name, int components, std::uint64_t bytes) {
+    // One component is what goes without saying: some readers make columns of what is said to have one.
     text_ += fmt::format(
-        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
-        "offset=\"{}\"/>\n",
-        type, escaped(name), components, offset_);
+        "<DataArray type=\"{}\" Name=\"{}\" {}format=\"appended\" offset=\"{}\"/>\n", type, escaped(name),
+        components == 1 ? "" : fmt::format("NumberOfComponents=\"{}\" ", components), offset_);
     offset_ += 8 + bytes;
 }
 

@@ -282,6 +282,18 @@ TEST(SolidInput, DustFarFromTheOriginIsASolidToo) {
     expect_seeds(all, input);
 }
 
+/// A tetrahedron with corners a unit in the last place beside a plane, as maps have among their dust.
+TEST(SolidInput, RefusesPiecesWithoutAPointInside) {
+    const TriMesh flake = test::mesh_of({{139.356247f, 146.058289f, 117.744034f},
+                                         {139.365158f, 146.05838f, 117.744049f},
+                                         {139.365173f, 146.056793f, 117.752037f},
+                                         {139.356232f, 146.056702f, 117.752022f}},
+                                        {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}});
+    expect_tells(refusal(joined(icosphere(2, 300), shifted(flake, {600, 0, 0}))),
+                 "too thin to tell its inside from its outside");
+    expect_tells(refusal(flake), "too thin to tell its inside from its outside");
+}
+
 TEST(SolidInput, IsCancelled) {
     EXPECT_THROW(solid_input(icosphere(3, 10), "tetgen", Progress([](double) { return false; })), Cancelled);
 }

@@ -14,6 +14,7 @@
 #include "tests/support/tet_checks.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/mesh_subset.h"
+#include "vdbgeo/measure/mesh_components.h"
 #include "vdbgeo/surface/delaunay_surface.h"
 #include "vdbgeo/surface/label_surfaces.h"
 #include "vdbgeo/volume/phantom.h"
@@ -299,16 +300,18 @@ TEST_F(Tetgen, FillsThePiecesOfARealMap) {
     VDBGEO_NEEDS_DATA("mainmastseg/MAP_m4A.mrc.gz");
     if (!have_delaunay()) GTEST_SKIP() << "this build has no CGAL";
     MapReadOptions reading;
-    reading.crop = Crop{{70, 70, 70}, {110, 110, 110}};
+    reading.crop = Crop{{80, 80, 80}, {100, 100, 100}};
     const MapFile file = read_map(test::data_folder() / "mainmastseg/MAP_m4A.mrc.gz", reading);
     DelaunaySurfaceOptions options;
     options.isovalue = 0.7;
-    const TriMesh surface = delaunay_surface(file.map, options);
+    ComponentFilter filter;
+    filter.min_volume_A3 = 0.1;
+    const TriMesh surface = filter_components(delaunay_surface(file.map, options), filter);
     const TetMesh mesh = tetgen_tetrahedra(surface);
     test::expect_sound(mesh);
     test::expect_kept(mesh, surface);
     expect_volume(mesh, surface);
-    EXPECT_GT(mesh.tets.size(), 10'000u);
+    EXPECT_GT(mesh.tets.size(), 5000u);
 }
 
 }  // namespace

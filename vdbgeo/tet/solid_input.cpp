@@ -308,6 +308,11 @@ void set_seeds(const TriMesh& surface, const Sides& sides, const Pieces& pieces,
                 "{}: a solid lies in another one about {}; turn its surface inward where it is a cavity, or "
                 "give both a label",
                 stage, place(point)));
+        if (winding < 1 && !pieces.cavity[p])
+            throw InvalidInput(
+                fmt::format("{}: the piece about {} is too thin to tell its inside from its "
+                            "outside; drop small pieces (--min-volume), or try remesh",
+                            stage, place(point)));
         if (winding < 1)
             throw InvalidInput(fmt::format(
                 "{} needs pieces that are turned outward, or inward in a shell: the one about {} is inside "

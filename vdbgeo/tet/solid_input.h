@@ -38,10 +38,10 @@ struct SolidInput {
 ///
 /// Throws InvalidInput, beginning with `stage`, for what cannot be filled: no faces, coordinates that are not
 /// finite, an open or a non-manifold surface, faces that run against each other, pieces that are turned
-/// inward without a shell around them ("inside out; try repair"), solids in solids, faces without area, faces
-/// that cut or touch each other (with how many pairs and one of them; try repair; not looked for where this
-/// build has no CGAL), labels that are no whole numbers from 1 on. Cost: that of self_intersections, and
-/// about 2 µs a face.
+/// inward without a shell around them ("inside out; try repair"), solids in solids, pieces too
+/// thin for a point within (some units in the last place), faces without area, faces that cut or touch each
+/// other (with how many pairs and one of them; try repair; not looked for where this build has no CGAL),
+/// labels that are no whole numbers from 1 on. Cost: that of self_intersections, and about 2 µs a face.
 SolidInput solid_input(const TriMesh& surface, const std::string& stage, const Progress& progress = {});
 
 }  // namespace vdbgeo

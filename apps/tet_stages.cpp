@@ -78,14 +78,27 @@ TetMesh by_cgal(const TetInput& input, const TetFlags& flags, const Progress& pr
     return delaunay_tetrahedra(input.map, input.isovalue, o, rest);
 }
 
+/// Whether a triangle's corners lie on a line: refinement goes down to triangles that floats cannot hold.
+bool has_flat_face(const TriMesh& mesh) {
+    return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+        const Vec3d a = mesh.points[t[0]].cast<double>(), b = mesh.points[t[1]].cast<double>(),
+                    c = mesh.points[t[2]].cast<double>();
+        return (b - a).cross(c - a).squaredNorm() == 0;
+    });
+}
+
 /// The surface that is filled: the input itself, the labels' smooth ones, or of a map one whose triangles are
-/// well shaped.
+/// well shaped. Where rounding leaves a triangle of that flat, a radius a tenth smaller gives other triangles.
 TriMesh surface_to_fill(const TetInput& input, const TetFlags& flags, const TetComponentFilter& filter,
                         const Progress& progress) {
     if (input.source != TetSource::map) return input.surface;
     DelaunaySurfaceOptions o = flags.surface(input.unit_A);
     o.isovalue = input.isovalue;
-    return kept(delaunay_surface(input.map, o, progress), input.file, filter);
+    constexpr int most_tries = 4;
+    for (int i = 0;; ++i, o.radius *= 0.9) {
+        TriMesh mesh = kept(delaunay_surface(input.map, o, progress), input.file, filter);
+        if (i + 1 == most_tries || !has_flat_face(mesh)) return mesh;
+    }
 }
 
 SurfaceProjection projection_for(const TetInput& input, const std::string& method) {

@@ -6,8 +6,8 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/measure/mesh_measures.h"
-#include "vdbgeo/surface/mesh_solid.h"
 #include "vdbgeo/surface/delaunay_surface.h"
+#include "vdbgeo/surface/mesh_solid.h"
 #include "vdbgeo/surface/seeded_delaunay.h"
 
 namespace vdbgeo {

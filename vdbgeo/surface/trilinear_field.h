@@ -1,4 +1,5 @@
-// The trilinear interpolant of a sparse grid at any place, fast. For what meshes a map as a function of place.
+// The trilinear interpolant of a sparse grid at any place, fast. For what meshes a map as a function of
+// place.
 #pragma once
 
 #include <array>

@@ -16,10 +16,10 @@
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/Random.h>
 #include <CGAL/Spatial_sort_traits_adapter_3.h>
+#include <CGAL/exude_mesh_3.h>
 #include <CGAL/lloyd_optimize_mesh_3.h>
 #include <CGAL/odt_optimize_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
-#include <CGAL/exude_mesh_3.h>
 #include <CGAL/refine_mesh_3.h>
 #include <CGAL/spatial_sort.h>
 #include <fmt/format.h>
@@ -192,11 +192,12 @@ class Watch {
     }
     /// A facet far below every bound was met: the manifold criterion follows a place without end.
     void tiny_facet() {
-        if (tiny_.fetch_add(1, std::memory_order_relaxed) < most_tiny) return;
+        if (!limit_tiny_ || tiny_.fetch_add(1, std::memory_order_relaxed) < most_tiny) return;
         runaway = true;
         stop = true;
     }
-    void forget_tiny() {
+    void limit_tiny(bool limited) {
+        limit_tiny_ = limited;
         tiny_ = 0;
         runaway = false;
         if (!failure_) stop = false;
@@ -209,9 +210,7 @@ class Watch {
         check(0);
         advance(part);
     }
-    double seconds_left() const {
-        return std::chrono::duration<double>(deadline_ - Clock::now()).count();
-    }
+    double seconds_left() const { return std::chrono::duration<double>(deadline_ - Clock::now()).count(); }
     void check(std::size_t vertices) const {
         if (vertices >= bounds_.max_vertices)
             throw NumericalError(
@@ -226,7 +225,7 @@ class Watch {
     }
 
  private:
-    static constexpr std::uint64_t most_tiny = 5000;
+    static constexpr std::uint64_t most_tiny = 20000;
 
     void advance(double part) {
         reported_ = std::max(reported_, part);
@@ -237,6 +236,7 @@ class Watch {
     const Clock::time_point deadline_;
     Progress progress_;
     double expected_ = 1, reported_ = 0;
+    bool limit_tiny_ = false;
     std::atomic<std::uint64_t> ticks_{0}, tiny_{0};
     std::mutex mutex_;
     std::exception_ptr failure_;
@@ -269,10 +269,7 @@ class FacetCriteria {
         const double size = bounds_->facet_size * (bounds_->graded ? bounds_->graded(centre)[0] : 1);
         const double ball = (p[0] - centre).squaredNorm();
         if (ball > size * size) return Quality(0, size * size / ball);
-        if (ball < 1e-10 * bounds_->facet_size * bounds_->facet_size) {
-            watch_->tiny_facet();
-            return {};
-        }
+        if (ball < tiny_ * tiny_ * bounds_->facet_size * bounds_->facet_size) watch_->tiny_facet();
         if (!on_boundary) return Quality(1, 0);
         return shape(p, centre, ball);
     }
@@ -296,6 +293,7 @@ class FacetCriteria {
 
     const TetMesherBounds* bounds_;
     Watch* watch_;
+    static constexpr double tiny_ = 1.0 / 512;
     double sine_squared_ = 0;
 };
 
@@ -304,10 +302,12 @@ class CellCriteria {
     using Cell_quality = Quality;
     using Is_cell_bad = Fault;
 
-    CellCriteria(const TetMesherBounds& bounds, Watch& watch) : bounds_(&bounds), watch_(&watch) {}
+    CellCriteria(const TetMesherBounds& bounds, Watch& watch, const bool& boundary_only)
+        : bounds_(&bounds), watch_(&watch), boundary_only_(&boundary_only) {}
 
     Fault operator()(const Triangulation& t, const Cell& c) const {
         watch_->tick(t);
+        if (*boundary_only_) return {};
         std::array<Vec3d, 4> p;
         for (int k = 0; k < 4; ++k) p[static_cast<std::size_t>(k)] = vec(c->vertex(k)->point());
         const Vec3d centre = vec(t.dual(c));
@@ -316,8 +316,8 @@ class CellCriteria {
         if (radius > size * size) return Quality(0, size * size / radius);
         double shortest = std::numeric_limits<double>::infinity();
         for (const auto& [a, b] : tet_edges)
-            shortest = std::min(shortest, (p[static_cast<std::size_t>(a)] - p[static_cast<std::size_t>(b)])
-                                              .squaredNorm());
+            shortest = std::min(
+                shortest, (p[static_cast<std::size_t>(a)] - p[static_cast<std::size_t>(b)]).squaredNorm());
         const double bound = bounds_->cell_radius_edge * bounds_->cell_radius_edge * shortest;
         if (radius > bound && radius > 1e-10 * bounds_->cell_size * bounds_->cell_size)
             return Quality(1, bound / radius);
@@ -327,6 +327,7 @@ class CellCriteria {
  private:
     const TetMesherBounds* bounds_;
     Watch* watch_;
+    const bool* boundary_only_;
 };
 
 struct Criteria {
@@ -359,7 +360,8 @@ class Visitor {
     }
     void tick() {
         if (parallel) return;  // CGAL's threads hold locks here
-        const double done = 1 - static_cast<double>(left_) / static_cast<double>(std::max<std::size_t>(1, most_));
+        const double done =
+            1 - static_cast<double>(left_) / static_cast<double>(std::max<std::size_t>(1, most_));
         watch_->step(from_ + (to_ - from_) * std::max(0.0, done));
     }
 
@@ -375,20 +377,19 @@ class Mesher final : public TetMesher {
         : bounds_(bounds),
           domain_(domain, bounds.low, bounds.high),
           watch_(bounds_),
-          criteria_{FacetCriteria(bounds_, watch_), CellCriteria(bounds_, watch_)},
-          manifold_(bounds.manifold) {
+          criteria_{FacetCriteria(bounds_, watch_), CellCriteria(bounds_, watch_, boundary_only_)} {
         CGAL::get_default_random() = CGAL::Random(0);
     }
 
     void insert(const std::vector<BoundarySeed>& seeds) override;
-    void refine(double expected, const Progress& progress) override;
+    void refine(Extent extent, double expected, const Progress& progress) override;
     std::vector<char> seeds_met() const override;
     void optimize(const TetMesherOptimization& what, const Progress& progress) override;
     TetMesh mesh() const override;
 
  private:
     Triangulation& triangulation() { return complex_.triangulation(); }
-    void refine_once();
+    void refine_once(bool manifold);
     template <class Optimizer>
     void run_limited(Optimizer& optimizer, const Visitor& visitor);
     template <class Move>
@@ -399,8 +400,8 @@ class Mesher final : public TetMesher {
     const TetMesherBounds bounds_;
     const Domain domain_;
     Watch watch_;
+    bool boundary_only_ = false;
     const Criteria criteria_;
-    bool manifold_;
     Complex complex_;
     std::vector<Vertex> seed_vertices_;
     std::vector<std::array<std::int32_t, 2>> seed_regions_;
@@ -435,27 +436,29 @@ void Mesher::insert(const std::vector<BoundarySeed>& seeds) {
     for (const BoundarySeed& s : seeds) seed_regions_.push_back(s.regions);
 }
 
-void Mesher::refine_once() {
+void Mesher::refine_once(bool manifold) {
     using CGAL::parameters::internal::Manifold_options;
-    const int topology = manifold_ ? Manifold_options::MANIFOLD : Manifold_options::NON_MANIFOLD;
+    const int topology = manifold ? Manifold_options::MANIFOLD : Manifold_options::NON_MANIFOLD;
     CGAL::Mesh_error_code error{};
     CGAL::Mesh_3::Mesher_3<Complex, Criteria, Domain> mesher(complex_, domain_, criteria_, topology,
-                                                            bounds_.max_vertices, &error, &watch_.stop);
+                                                             bounds_.max_vertices, &error, &watch_.stop);
     mesher.refine_mesh("");
     complex_.clear_manifold_info();
     watch_.rethrow();
     if (error == CGAL::CGAL_MESH_3_MAXIMAL_NUMBER_OF_VERTICES_REACHED) watch_.check(bounds_.max_vertices);
 }
 
-void Mesher::refine(double expected, const Progress& progress) {
+void Mesher::refine(Extent extent, double expected, const Progress& progress) {
     watch_.begin(expected, progress);
     watch_.check(0);
-    if (triangulation().dimension() < 3) throw NumericalError("the solid is too flat for Delaunay refinement");
-    refine_once();
+    if (triangulation().dimension() < 3)
+        throw NumericalError("the solid is too flat for Delaunay refinement");
+    boundary_only_ = extent == Extent::boundary;
+    watch_.limit_tiny(bounds_.manifold && !boundary_only_);
+    refine_once(bounds_.manifold && !boundary_only_);
     if (watch_.runaway) {
-        manifold_ = false;
-        watch_.forget_tiny();
-        refine_once();
+        watch_.limit_tiny(false);
+        refine_once(false);
     }
     watch_.step(1);
 }
@@ -500,24 +503,37 @@ void Mesher::smooth(const Visitor& visitor) {
     constexpr int most_iterations = 10;
     constexpr double freeze = 0.01, convergence = 0.02;
     CGAL::Mesh_3::Mesh_global_optimizer<Complex, Domain, Move, Visitor> optimizer(complex_, domain_, freeze,
-                                                                                 true, convergence);
+                                                                                  true, convergence);
     optimizer.set_time_limit(0);
     optimizer(most_iterations, visitor);
 }
 
+using Angle = CGAL::Mesh_3::Min_dihedral_angle_criterion<Triangulation>;
+
+/// CGAL's perturber goes from bound to bound in steps of this criterion's unit and ends at the first that
+/// some vertex cannot reach. With the bound as its unit it takes one step, and the others are not held up.
+class OneStep final : public Angle {
+ public:
+    using Angle::Angle;
+    double get_perturbation_unit() const override { return sliver_bound(); }
+};
+
 void Mesher::perturb(double bound, const Visitor& visitor) {
-    using Angle = CGAL::Mesh_3::Min_dihedral_angle_criterion<Triangulation>;
-    using Perturber = CGAL::Mesh_3::Sliver_perturber<Complex, Domain, Angle, Visitor>;
-    Perturber perturber(complex_, domain_, Angle(bound, triangulation()));
-    perturber.add_perturbation(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, Angle>(40, 0.05));
-    perturber.add_perturbation(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, Angle>(40, 0.05));
-    perturber.add_perturbation(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, Angle>(40, 0.05));
-    perturber.add_perturbation(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, Angle>(100, 0.15));
-    run_limited(perturber, visitor);
+    using Perturber = CGAL::Mesh_3::Sliver_perturber<Complex, Domain, OneStep, Visitor>;
+    constexpr double step = 2;
+    for (double reach = std::fmod(bound, step) > 0 ? std::fmod(bound, step) : step; reach <= bound + 1e-9;
+         reach += step) {
+        Perturber perturber(complex_, domain_, OneStep(reach, triangulation()));
+        const auto add = [&](auto* perturbation) { perturber.add_perturbation(perturbation); };
+        add(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, OneStep>(40, 0.05));
+        add(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, OneStep>(40, 0.05));
+        add(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, OneStep>(40, 0.05));
+        add(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, OneStep>(100, 0.15));
+        run_limited(perturber, visitor);
+    }
 }
 
 void Mesher::exude(double bound, const Visitor& visitor) {
-    using Angle = CGAL::Mesh_3::Min_dihedral_angle_criterion<Triangulation>;
     CGAL::Mesh_3::Slivers_exuder<Complex, Angle, Visitor> exuder(complex_, Angle(bound, triangulation()));
     run_limited(exuder, visitor);
 }

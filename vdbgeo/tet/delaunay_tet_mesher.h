@@ -63,10 +63,12 @@ class TetMesher {
     virtual ~TetMesher() = default;
 
     virtual void insert(const std::vector<BoundarySeed>& seeds) = 0;
-    /// Until every bound holds. `expected` vertices, for the progress. Where a boundary that has to be a
-    /// manifold touches itself in a point, no refinement can mend that: below 1e-5 of the facet size it is
-    /// left as it is.
-    virtual void refine(double expected, const Progress& progress) = 0;
+    enum class Extent { boundary, everything };
+    /// Until every bound holds, or those on the boundary (which need not be a manifold then). `expected`
+    /// vertices, for the progress. Where a boundary that has to be a manifold touches itself in a point, no
+    /// refinement can mend that: after 20000 triangles of less than 1/512 of the facet size it is left as it
+    /// is.
+    virtual void refine(Extent extent, double expected, const Progress& progress) = 0;
     /// For each seed so far: whether both its regions have a tetrahedron at it.
     virtual std::vector<char> seeds_met() const = 0;
     virtual void optimize(const TetMesherOptimization& what, const Progress& progress) = 0;

@@ -174,7 +174,8 @@ TetMesh delaunay_tetrahedra(const DensityMap& map, double isovalue, const Delaun
     cubes.isovalue = isovalue;
     const TriMesh surface = cap_border(marching_cubes(map, cubes, progress.part(0, 0.02)), map, isovalue,
                                        progress.part(0.02, 0.03));
-    if (surface.empty()) throw NumericalError(fmt::format("nothing of the map is at or above {:g}", isovalue));
+    if (surface.empty())
+        throw NumericalError(fmt::format("nothing of the map is at or above {:g}", isovalue));
     const MapDomain domain(map, isovalue);
     const Vec3d voxel = map.frame.voxel_size();
     const ReferenceBoundary reference = reference_of(surface, voxel.minCoeff());
@@ -196,9 +197,9 @@ TetMesh delaunay_tetrahedra_of_labels(const DensityMap& labels, const std::vecto
     set_box(seeded.bounds, reference.points, voxel.sum());
     TetMesh mesh = seeded_tetrahedra(domain, reference, seeded, progress.part(0.02, 1));
     for (const std::int32_t label : domain.labels()) {
-        if (mesh.regions.empty() ? label == 1
-                                 : std::find(mesh.regions.begin(), mesh.regions.end(), label) !=
-                                       mesh.regions.end())
+        if (mesh.regions.empty()
+                ? label == 1
+                : std::find(mesh.regions.begin(), mesh.regions.end(), label) != mesh.regions.end())
             continue;
         throw NumericalError(
             fmt::format("no tetrahedron of label {} was made: try smaller facet and cell sizes", label));
@@ -218,7 +219,8 @@ TetMesh delaunay_tetrahedra(const TriMesh& surface, const DelaunayTetrahedraOpti
                         "non-manifold edges; repair may mend that",
                         measures.boundary_edges, measures.non_manifold_edges));
     const double unit = mean_edge(surface);
-    if (!(unit > 0 && std::isfinite(unit))) throw InvalidInput("Delaunay tetrahedra: the surface has no size");
+    if (!(unit > 0 && std::isfinite(unit)))
+        throw InvalidInput("Delaunay tetrahedra: the surface has no size");
     const ReferenceBoundary reference = reference_of(surface, 0.5 * unit);
     const MeshDomain domain(reference.points, reference.triangles, unit);
     SeededTetOptions seeded = seeded_options(options, unit);

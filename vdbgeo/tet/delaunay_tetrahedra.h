@@ -16,15 +16,15 @@ namespace vdbgeo {
 /// The bounds of the paper's §3.4. Lengths are in voxels (the smallest voxel step), for a surface in mean
 /// edges of it.
 struct DelaunayTetrahedraOptions {
-    double facet_angle_deg = 25;   ///< least angle of a boundary triangle; up to 30
-    double facet_size = 1.7;       ///< largest radius of a boundary triangle's surface Delaunay ball
-    double facet_distance = 0.2;   ///< largest distance from its circumcentre to that ball's centre
-    double cell_radius_edge = 2;   ///< largest circumradius over shortest edge of a tetrahedron
-    double cell_size = 1.7;        ///< largest circumradius of a tetrahedron
-    SizeField size;                ///< Å; where set it bounds facets and cells too
-    bool lloyd = false, odt = false;     ///< global smoothing, before the next two
-    bool perturb = false, exude = false; ///< against slivers
-    double sliver_bound_deg = 12;  ///< dihedral angle that perturb and exude try to reach
+    double facet_angle_deg = 25;          ///< least angle of a boundary triangle; up to 30
+    double facet_size = 1.7;              ///< largest radius of a boundary triangle's surface Delaunay ball
+    double facet_distance = 0.2;          ///< largest distance from its circumcentre to that ball's centre
+    double cell_radius_edge = 2;          ///< largest circumradius over shortest edge of a tetrahedron
+    double cell_size = 1.7;               ///< largest circumradius of a tetrahedron
+    SizeField size;                       ///< Å; where set it bounds facets and cells too
+    bool lloyd = false, odt = false;      ///< global smoothing, before the next two
+    bool perturb = false, exude = false;  ///< against slivers
+    double sliver_bound_deg = 12;         ///< dihedral angle that perturb and exude try to reach
     /// Faster with several threads, and another mesh each run. Else one thread and the same bytes.
     bool parallel = false;
     std::uint64_t max_vertices = 20'000'000;
@@ -46,8 +46,8 @@ TetMesh delaunay_tetrahedra(const DensityMap& map, double isovalue,
 
 /// All labels of a segmentation above 0 (or those listed), or of a label map cut out of one: one region each,
 /// with the label's number; labels that touch share the vertices and faces between them. Every label has
-/// tetrahedra: each of its components of more than a voxel or so is seeded, and the smaller ones meshed finer.
-/// Throws InvalidInput for what is no segmentation (is_label_map), or has no such label.
+/// tetrahedra: each of its components of more than a voxel or so is seeded, and the smaller ones meshed
+/// finer. Throws InvalidInput for what is no segmentation (is_label_map), or has no such label.
 TetMesh delaunay_tetrahedra_of_labels(const DensityMap& labels, const std::vector<std::int64_t>& wanted = {},
                                       const DelaunayTetrahedraOptions& options = {},
                                       const Progress& progress = {});

@@ -189,7 +189,8 @@ void LabelDomain::make_cells(const Progress& progress) {
 }
 
 /// Appends the regions at the corners of a cell and their weights there; none where all corners are of one.
-void LabelDomain::weigh(const Coord& c, std::vector<std::int32_t>& labels, std::vector<float>& weights) const {
+void LabelDomain::weigh(const Coord& c, std::vector<std::int32_t>& labels,
+                        std::vector<float>& weights) const {
     constexpr int around = 2, side = 2 * around + 2;
     std::array<std::int32_t, side * side * side> near;
     for (int x = 0; x < side; ++x)

@@ -18,8 +18,8 @@ namespace vdbgeo {
 /// which takes away the staircase. A voxel keeps its label: where another one's weight m is larger by d, its
 /// own becomes m + max(d, 0.05), so that single voxels and membranes of one voxel stay, some 0.8 and 0.7
 /// voxels thick. Between the voxels weights are interpolated linearly, and the largest wins, of equal ones
-/// the lower label. So the regions part space without gaps, and where all corners of a cell have one label the
-/// cell has it too.
+/// the lower label. So the regions part space without gaps, and where all corners of a cell have one label
+/// the cell has it too.
 ///
 /// Voxels outside the box are 0. Cost: some 100 ns a question near a boundary, 30 elsewhere; 100 bytes for
 /// each cell with two labels.
@@ -59,8 +59,8 @@ class LabelDomain final : public TetDomain {
     bool all_ = true;
     std::vector<std::int32_t> labels_;
     std::vector<Cell> cells_;
-    std::vector<std::int32_t> slots_;         // open addressing by a cell's key; -1: free
-    std::vector<std::int32_t> cell_labels_;   // each cell's, in order
+    std::vector<std::int32_t> slots_;            // open addressing by a cell's key; -1: free
+    std::vector<std::int32_t> cell_labels_;      // each cell's, in order
     std::vector<std::array<float, 8>> weights_;  // of each of these at the cell's corners
 };
 

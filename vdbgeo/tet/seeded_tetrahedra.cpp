@@ -34,9 +34,10 @@ TetDomain::Crossing TetDomain::crossing(const Vec3d& a, std::int32_t ra, const V
 
 namespace {
 
-constexpr int max_rounds = 5;
+constexpr int max_rounds = 4;
 constexpr double seed_spacing = 1.2;   // in facet sizes
-constexpr double part_spacing = 0.17;  // in diagonals of a small part
+constexpr double lost_within = 1.8;    // distances between seeds
+constexpr double part_spacing = 0.14;  // in diagonals of a small part
 
 /// splitmix64's finaliser, as a number from 0 to 1.
 double scatter(std::uint64_t n) {
@@ -52,35 +53,39 @@ class Seeder {
         : domain_(domain),
           reference_(reference),
           bounds_(bounds),
-          hash_(seed_spacing * bounds.facet_size) {
+          hash_(lost_within * seed_spacing * bounds.facet_size) {
         measure_parts();
     }
 
     /// Seeds on the whole boundary.
     std::vector<BoundarySeed> first() {
-        begin();
         for (std::size_t t = 0; t < reference_.triangles.size(); ++t)
-            sample(corner(t, 0), corner(t, 1), corner(t, 2), reference_.part[t], 1, 24);
-        return std::move(fresh_);
+            sample(corner(t, 0), corner(t, 1), corner(t, 2), reference_.part[t], 24);
+        return seeds_;
     }
 
-    /// Seeds around those that were not met, `fraction` of the usual distance apart.
-    std::vector<BoundarySeed> around(const std::vector<char>& met, double fraction) {
-        begin();
-        const double reach = 1.5 * seed_spacing * bounds_.facet_size;
-        SpaceHash spots(reach);
-        for (std::uint32_t s = 0; s < met.size(); ++s)
-            if (!met[s] && !stands_in(met, s)) spots.add(seeds_[s].place, s);
+    /// Seeds around those of the last round that are lost, twice as densely.
+    std::vector<BoundarySeed> around(const std::vector<char>& met) {
+        const std::size_t last = seeds_.size() - fresh_;
+        fresh_ = 0;
+        fraction_ /= 2;
+        SpaceHash spots(1.5 * seed_spacing * bounds_.facet_size);
+        std::size_t unmet = 0;
+        for (std::size_t s = last; s < met.size(); ++s)
+            if (lost(met, s)) {
+                spots.add(seeds_[s].place, static_cast<std::uint32_t>(s));
+                ++unmet;
+            }
+        if (unmet == 0) return {};
         for (std::size_t t = 0; t < reference_.triangles.size(); ++t) {
-            const std::uint32_t part = reference_.part[t];
             const Vec3d centre = (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3;
-            const double near = 1.5 * spacing(part, centre) + longest(t);
+            const double size = 0.6 * longest(t);
             if (spots.near(centre, [&](std::uint32_t s) {
-                    return (seeds_[s].place - centre).squaredNorm() < near * near;
+                    return (seeds_[s].place - centre).norm() < 1.5 * spacing_[s] + size;
                 }))
-                sample(corner(t, 0), corner(t, 1), corner(t, 2), part, fraction, 24);
+                sample(corner(t, 0), corner(t, 1), corner(t, 2), reference_.part[t], 24);
         }
-        return std::move(fresh_);
+        return {seeds_.end() - static_cast<std::ptrdiff_t>(fresh_), seeds_.end()};
     }
 
     /// How many vertices the mesh may have in the end.
@@ -104,8 +109,6 @@ class Seeder {
                          (corner(t, 2) - corner(t, 0)).norm()});
     }
 
-    void begin() { fresh_.clear(); }
-
     void measure_parts() {
         std::uint32_t parts = 0;
         for (const std::uint32_t p : reference_.part) parts = std::max(parts, p + 1);
@@ -125,29 +128,30 @@ class Seeder {
         return std::min(seed_spacing * size, part_spacing * part_size_[part]);
     }
 
-    /// Whether a seed beside this one was met in its stead.
-    bool stands_in(const std::vector<char>& met, std::uint32_t s) const {
-        const double near = 0.5 * spacing_[s];
-        return hash_.near(seeds_[s].place, [&](std::uint32_t n) {
-            return n < met.size() && met[n] && seeds_[n].regions == seeds_[s].regions &&
+    /// A seed that was not met, nor was any around it. Single ones are left alone: they stand at the tips of
+    /// spikes.
+    bool lost(const std::vector<char>& met, std::size_t s) const {
+        if (met[s]) return false;
+        const double near = lost_within * spacing_[s];
+        return !hash_.near(seeds_[s].place, [&](std::uint32_t n) {
+            return n < met.size() && met[n] && part_of_[n] == part_of_[s] &&
                    (seeds_[n].place - seeds_[s].place).squaredNorm() < near * near;
         });
     }
 
     /// Splits a triangle until its parts are smaller than the distance of the seeds, and offers a place in
     /// each.
-    void sample(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t part, double fraction,
-                int depth) {
+    void sample(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t part, int depth) {
         const std::array<const Vec3d*, 3> at = {&a, &b, &c};
         std::size_t k = 0;
         const auto length = [&](std::size_t e) { return (*at[e] - *at[(e + 1) % 3]).norm(); };
         for (std::size_t e = 1; e < 3; ++e)
             if (length(e) > length(k)) k = e;
-        const double wanted = fraction * spacing(part, (a + b + c) / 3);
+        const double wanted = fraction_ * spacing(part, (a + b + c) / 3);
         if (depth > 0 && length(k) > 0.75 * wanted) {
             const Vec3d &u = *at[k], &v = *at[(k + 1) % 3], &w = *at[(k + 2) % 3], m = 0.5 * (u + v);
-            sample(u, m, w, part, fraction, depth - 1);
-            sample(m, v, w, part, fraction, depth - 1);
+            sample(u, m, w, part, depth - 1);
+            sample(m, v, w, part, depth - 1);
             return;
         }
         offer(a, b, c, part, wanted);
@@ -169,13 +173,13 @@ class Seeder {
         const std::optional<BoundarySeed> seed = project(place, normal, part);
         if (!seed || taken(seed->place)) return;
         if (seeds_.size() >= bounds_.max_vertices)
-            throw NumericalError(fmt::format(
-                "sizes that small need more than {} vertices: try larger sizes", bounds_.max_vertices));
+            throw NumericalError(fmt::format("sizes that small need more than {} vertices: try larger sizes",
+                                             bounds_.max_vertices));
         hash_.add(seed->place, static_cast<std::uint32_t>(seeds_.size()));
         seeds_.push_back(*seed);
         part_of_.push_back(part);
         spacing_.push_back(wanted);
-        fresh_.push_back(*seed);
+        ++fresh_;
     }
 
     std::optional<BoundarySeed> project(const Vec3d& place, const Vec3d& normal, std::uint32_t part) const {
@@ -194,7 +198,9 @@ class Seeder {
     const TetMesherBounds& bounds_;
     std::vector<double> part_size_;
     SpaceHash hash_;
-    std::vector<BoundarySeed> seeds_, fresh_;
+    std::vector<BoundarySeed> seeds_;
+    std::size_t fresh_ = 0;  // the last of them, of this round
+    double fraction_ = 1;    // of the usual distance
     std::vector<std::uint32_t> part_of_;
     std::vector<double> spacing_;
     std::uint64_t offered_ = 0;
@@ -301,16 +307,15 @@ TetMesh seeded_tetrahedra(const TetDomain& domain, const ReferenceBoundary& refe
         options.parallel ? make_parallel_tet_mesher(domain, bounds) : make_tet_mesher(domain, bounds);
     const TetMesherOptimization& more = options.optimization;
     const bool optimize = more.lloyd || more.odt || more.perturb || more.exude;
-    const double refined = optimize ? 0.2 : 0.95;
+    const double refined = optimize ? 0.2 : 0.95, expected = seeder.expected_vertices();
     progress.report(0.02);
-    double fraction = 1;
     for (int round = 0; round < max_rounds && !seeds.empty(); ++round) {
         mesher->insert(seeds);
-        mesher->refine(seeder.expected_vertices(),
-                       progress.part(round == 0 ? 0.02 : 0.9 * refined, round == 0 ? 0.9 * refined : refined));
-        fraction /= 2;
-        seeds = seeder.around(mesher->seeds_met(), fraction);
+        mesher->refine(TetMesher::Extent::boundary, expected,
+                       progress.part((0.1 + 0.1 * round) * refined, (0.2 + 0.1 * round) * refined));
+        seeds = seeder.around(mesher->seeds_met());
     }
+    mesher->refine(TetMesher::Extent::everything, expected, progress.part(0.5 * refined, refined));
     if (optimize) mesher->optimize(more, progress.part(refined, 0.95));
     TetMesh mesh = in_order(sound_mesh(*mesher, progress.part(0.95, 0.97)), bounds.low, bounds.high);
     set_faces(mesh);

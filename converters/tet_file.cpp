@@ -159,14 +159,14 @@ std::string FaceGroups::name(std::size_t g) const {
 void write_tets(const TetMesh& mesh, const std::filesystem::path& path, const Progress& progress) {
     const Format& format = known_format(path);
     check(mesh, path.string());
-    if (mesh.faces.empty() && !mesh.tets.empty()) {  // were not asked for yet
-        TetMesh with_faces{mesh.points,        mesh.tets, mesh.regions, {}, {}, mesh.vertex_properties,
-                           mesh.tet_properties};
-        set_faces(with_faces);
-        return write_tets(with_faces, path, progress);
+    if (!mesh.faces.empty() || mesh.tets.empty()) {
+        format.write({mesh, FaceGroups(mesh), path, progress});
+    } else {  // faces were not asked for yet
+        TetMesh whole{mesh.points,        mesh.tets, mesh.regions, {}, {}, mesh.vertex_properties,
+                      mesh.tet_properties};
+        set_faces(whole);
+        format.write({whole, FaceGroups(whole), path, progress});
     }
-    const FaceGroups groups(mesh);
-    format.write({mesh, groups, path, progress});
     progress.report(1);
 }
 

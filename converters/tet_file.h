@@ -24,17 +24,31 @@ namespace vdbgeo {
 /// two
 ///   is named; region attributes and boundary markers.
 ///
-/// Coordinates come back with the same bits. Throws InvalidInput for another ending and a mesh that check()
-/// refuses; IoError where writing fails, and then no old file is touched.
+/// Pairs of regions are numbered from 1, sorted by the region behind and the one before; remarks or names in
+/// the file tell them. Coordinates come back with the same bits, tetrahedra in the same order; properties
+/// come back from .vtu alone. Faces are found for a mesh that has none yet, on a copy.
+///
+/// Throws InvalidInput for another ending, a mesh that check() refuses, and in .vtu for properties whose
+/// names the format cannot hold; IoError where writing fails, and then no old file is touched. The three
+/// files of TetGen get their names when all are complete. The same bytes for any number of threads; some 20
+/// MB of memory, for Gmsh 4 bytes a tetrahedron and 8 a point besides.
 void write_tets(const TetMesh& mesh, const std::filesystem::path& path, const Progress& progress = {});
 
-/// Reads what write_tets writes, and what other programs write in these formats: Medit ASCII, Gmsh 2.2
-/// and 4.1 (text and binary), TetGen's files counted from 0 or 1, VTU in all its encodings. Elements of other
-/// kinds (lines, points) are passed over; hexahedra and the like are refused by name, quadratic tetrahedra
-/// lose their middle nodes with no word. Regions come from references, physical groups, attributes or the
-/// array `region` (0 becomes the next free number); where there is none all is region 1. Faces are set anew
-/// from the tetrahedra and regions. Turned-over tetrahedra are turned back where the whole file has the other
-/// orientation. Throws IoError, InvalidInput as read_mesh does.
+/// Reads what write_tets writes, and what other programs write in these formats: Medit ASCII, Gmsh 2 and 4.1
+/// (text and binary; vertices in the order of node tags, tetrahedra in that of element tags, which may be any
+/// numbers), TetGen's files counted from 0 or 1, VTU in all its encodings. Elements of other kinds (lines,
+/// points, triangles) are passed over; hexahedra and the like are refused by name, as is a file of triangles
+/// alone; quadratic tetrahedra lose their middle nodes with no word.
+///
+/// Regions come from references, physical groups (entities where no tetrahedron is in a group), the first
+/// attribute or the array `region`: whole numbers from 1 stay, all other labels get the next free numbers,
+/// the least label first; without labels all is region 1. Faces are set anew from the tetrahedra and regions.
+/// Where every tetrahedron is turned over all are turned back; otherwise they are left as they are.
+///
+/// Throws IoError where a file cannot be read, and InvalidInput, naming line, byte or array, where it is
+/// damaged: counts are compared with the file's length before memory is taken, corners must name existing
+/// points, coordinates must be finite, no two tetrahedra may be on the same side of a triangle. One pass over
+/// the file; memory: the mesh, and 8 bytes a tetrahedron (Gmsh: 28, and 8 a point).
 TetMesh read_tets(const std::filesystem::path& path, const Progress& progress = {});
 
 /// The endings that write_tets knows, with their dots, and as one text.

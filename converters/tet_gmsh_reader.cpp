@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <map>
 #include <numeric>
+#include <string_view>
+#include <utility>
 
 #include "converters/gmsh_source.h"
 #include "converters/tet_formats.h"
@@ -17,8 +19,8 @@ namespace {
 struct Element {
     int type, dimension;
     std::uint64_t nodes;
-    const char* name;
-    bool tetrahedron() const { return dimension == 3 && (*name == 't'); }
+    std::string_view name;
+    bool tetrahedron() const { return name == "tetrahedron"; }
 };
 constexpr Element elements[] = {
     {1, 1, 2, "line"},          {2, 2, 3, "triangle"},      {3, 2, 4, "quadrangle"},

@@ -71,6 +71,13 @@ TEST(TetFile, HardMeshesComeBackToo) {
     meshes.emplace_back("pieces that touch nowhere", test::cell_tets(3, [](int x, int y, int z) {
                             return (x + y + z) % 2 == 0 ? 0 : 1 + x * y * z;
                         }));
+    // A tetrahedron cut into four about its middle, and itself turned over: no face is left over.
+    TetMesh closed;
+    closed.points = {Vec3d(0, 0, 0), Vec3d(4, 0, 0), Vec3d(0, 4, 0), Vec3d(0, 0, 4), Vec3d(1, 1, 1)};
+    closed.tets = {{4, 1, 2, 3}, {0, 4, 2, 3}, {0, 1, 4, 3}, {0, 1, 2, 4}, {1, 0, 2, 3}};
+    set_faces(closed);
+    ASSERT_TRUE(closed.faces.empty());
+    meshes.emplace_back("without a boundary", closed);
     for (const auto& [name, each] : meshes)
         for (const std::string& ending : tet_endings()) {
             SCOPED_TRACE(name + " " + ending);

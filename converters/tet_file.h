@@ -18,11 +18,9 @@ namespace vdbgeo {
 /// - .mesh Medit (ASCII, version 2): vertices, tetrahedra with the region as reference, triangles with the
 ///   reference of their pair of regions; .meshb is not written;
 /// - .msh Gmsh 4.1, binary: a volume entity and a physical group `region_N` for each region, a surface entity
-/// and
-///   a physical group for each pair of regions (`boundary_N`, `interface_N_M`);
-/// - .node, .ele: TetGen's, with .face beside: names FILE.node, FILE.ele, FILE.face, whichever of the first
-/// two
-///   is named; region attributes and boundary markers.
+///   and a physical group for each pair of regions (`boundary_N`, `interface_N_M`);
+/// - .node, .ele: TetGen's, with .face beside: names FILE.node, FILE.ele, FILE.face, whichever of the
+///   first two is named; region attributes and boundary markers.
 ///
 /// Pairs of regions are numbered from 1, sorted by the region behind and the one before; remarks or names in
 /// the file tell them. Coordinates come back with the same bits, tetrahedra in the same order; properties

@@ -461,7 +461,9 @@ TEST_F(DelaunayTetrahedra, InParallelAreSoundToo) {
         const TetMesh mesh = delaunay_tetrahedra(map, 0, options);
         expect_sound(mesh);
         EXPECT_NEAR(volume(mesh), cubes, 0.01 * cubes);
-        if (optimise) EXPECT_GT(shape_of(mesh).least_dihedral, 5);
+        if (optimise) {
+            EXPECT_GT(shape_of(mesh).least_dihedral, 5);
+        }
     }
     options.perturb = options.exude = options.odt = false;
     const TetMesh labels = delaunay_tetrahedra_of_labels(half_balls(12), {}, options);

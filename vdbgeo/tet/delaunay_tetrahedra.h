@@ -18,7 +18,7 @@ namespace vdbgeo {
 struct DelaunayTetrahedraOptions {
     double facet_angle_deg = 25;          ///< least angle of a boundary triangle; up to 30
     double facet_size = 1.7;              ///< largest radius of a boundary triangle's surface Delaunay ball
-    double facet_distance = 0.2;          ///< largest distance from its circumcentre to that ball's centre
+    double facet_distance = 0.1;          ///< largest distance from its circumcentre to that ball's centre
     double cell_radius_edge = 2;          ///< largest circumradius over shortest edge of a tetrahedron
     double cell_size = 1.7;               ///< largest circumradius of a tetrahedron
     SizeField size;                       ///< Å; where set it bounds facets and cells too

@@ -17,7 +17,16 @@ namespace {
 using openvdb::Coord;
 
 constexpr double least_margin = 0.05;
-constexpr std::array<double, 5> binomial = {1.0 / 16, 4.0 / 16, 6.0 / 16, 4.0 / 16, 1.0 / 16};
+/// Binomials once and twice, B and B², as 2B − B².
+constexpr std::array<double, 5> once = {0, 1.0 / 4, 2.0 / 4, 1.0 / 4, 0},
+                                twice = {1.0 / 16, 4.0 / 16, 6.0 / 16, 4.0 / 16, 1.0 / 16};
+double kernel(int x, int y, int z) {
+    const auto product = [&](const std::array<double, 5>& b) {
+        return b[static_cast<std::size_t>(x)] * b[static_cast<std::size_t>(y)] *
+               b[static_cast<std::size_t>(z)];
+    };
+    return 2 * product(once) - product(twice);
+}
 constexpr double largest_label = 2147483647.0;
 
 /// 21 bits a coordinate.
@@ -44,7 +53,12 @@ const DensityMap& checked(const DensityMap& map) {
     return map;
 }
 
-/// The weight of each label around a voxel.
+/// A voxel keeps what it is: of a margin that is negative or small the sign is turned.
+double kept(double margin) {
+    return margin < least_margin ? std::max(std::abs(margin), least_margin) : margin;
+}
+
+/// The share of each label around a voxel.
 class Shares {
  public:
     void clear() { shares_.clear(); }
@@ -56,19 +70,23 @@ class Shares {
             }
         shares_.emplace_back(label, weight);
     }
-    /// The voxel's own label is made to win.
-    void keep(std::int32_t own) {
-        double other = 0;
-        for (const auto& [label, sum] : shares_)
-            if (label != own) other = std::max(other, sum);
-        for (auto& [label, sum] : shares_)
-            if (label == own && sum < other + least_margin)
-                sum = other + std::max(std::abs(other - sum), least_margin);
+    /// By how much the background outweighs the labels together.
+    double outside() const {
+        double margin = 0;
+        for (const auto& [label, sum] : shares_) margin += label == 0 ? sum : -sum;
+        return margin;
     }
     double of(std::int32_t label) const {
         for (const auto& [known, sum] : shares_)
             if (known == label) return sum;
         return 0;
+    }
+    /// By how much a label outweighs every other one.
+    double ahead(std::int32_t own) const {
+        double other = 0;
+        for (const auto& [label, sum] : shares_)
+            if (label != own && label != 0) other = std::max(other, sum);
+        return of(own) - other;
     }
 
  private:
@@ -217,13 +235,13 @@ void LabelDomain::weigh(const Coord& c, std::vector<std::int32_t>& labels,
         for (int x = 0; x < 5; ++x)
             for (int y = 0; y < 5; ++y)
                 for (int z = 0; z < 5; ++z)
-                    shares.add(at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)),
-                               binomial[static_cast<std::size_t>(x)] * binomial[static_cast<std::size_t>(y)] *
-                                   binomial[static_cast<std::size_t>(z)]);
-        shares.keep(own[static_cast<std::size_t>(k)]);
+                    shares.add(at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)), kernel(x, y, z));
+        const std::int32_t label = own[static_cast<std::size_t>(k)];
+        const double outside = label == 0 ? kept(shares.outside()) : -kept(-shares.outside());
+        const double gain = label == 0 ? 0 : kept(shares.ahead(label)) - shares.ahead(label);
         for (auto it = found.begin(); it != end; ++it)
             weights[first + 8 * static_cast<std::size_t>(it - found.begin()) + static_cast<std::size_t>(k)] =
-                static_cast<float>(shares.of(*it));
+                static_cast<float>(*it == 0 ? outside : shares.of(*it) + (*it == label ? gain : 0));
     }
 }
 
@@ -246,13 +264,15 @@ std::int32_t LabelDomain::region(const Vec3d& place) const {
     const Vec3d t = index - Vec3d(c.x(), c.y(), c.z());
     const auto mix = [](double p, double q, double w) { return p + (q - p) * w; };
     std::int32_t best = 0;
-    double most = -1;
+    double most = -std::numeric_limits<double>::infinity();
     for (std::uint32_t k = cell->first; k < cell->first + cell->count; ++k) {
         std::array<double, 8> w;
         for (std::size_t n = 0; n < 8; ++n) w[n] = static_cast<double>(weights_[k][n]);
         const double weight = mix(mix(mix(w[0], w[1], t.x()), mix(w[2], w[3], t.x()), t.y()),
                                   mix(mix(w[4], w[5], t.x()), mix(w[6], w[7], t.x()), t.y()), t.z());
-        if (weight > most) {
+        if (cell_labels_[k] == 0) {  // the first, as it is the smallest
+            if (weight > 0) return 0;
+        } else if (weight > most) {
             most = weight;
             best = cell_labels_[k];
         }

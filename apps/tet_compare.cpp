@@ -121,20 +121,26 @@ const std::vector<Column>& columns() {
     static const std::vector<Column> table{
         {"method", "method", [](const MethodRun& r) { return r.method; }},
         {"seconds", "s", [](const MethodRun& r) { return fmt::format("{:.3g}", seconds_of(r.result)); }},
-        {"seconds_in_all", "s in all", [](const MethodRun& r) { return fmt::format("{:.3g}", r.wall_seconds); }},
+        {"seconds_in_all", "s in all",
+         [](const MethodRun& r) { return fmt::format("{:.3g}", r.wall_seconds); }},
         {"peak_MB", "MB", [](const MethodRun& r) { return number(r.result, "peak_bytes", "{:.0f}", 1e-6); }},
         {"vertices", "vertices", [](const MethodRun& r) { return number(r.result, "vertices", "{:.0f}"); }},
         {"tets", "tets", [](const MethodRun& r) { return number(r.result, "tets", "{:.0f}"); }},
-        {"min_dihedral_deg", "min °", [](const MethodRun& r) { return number(r.result, "min_dihedral_deg", "{:.4g}"); }},
+        {"min_dihedral_deg", "min °",
+         [](const MethodRun& r) { return number(r.result, "min_dihedral_deg", "{:.4g}"); }},
         {"min_dihedral_p01_deg", "1 % below °",
          [](const MethodRun& r) { return number(r.result, "min_dihedral_p01_deg", "{:.4g}"); }},
-        {"max_dihedral_deg", "max °", [](const MethodRun& r) { return number(r.result, "max_dihedral_deg", "{:.4g}"); }},
-        {"radius_edge_max", "radius-edge", [](const MethodRun& r) { return number(r.result, "radius_edge_max", "{:.4g}"); }},
+        {"max_dihedral_deg", "max °",
+         [](const MethodRun& r) { return number(r.result, "max_dihedral_deg", "{:.4g}"); }},
+        {"radius_edge_max", "radius-edge",
+         [](const MethodRun& r) { return number(r.result, "radius_edge_max", "{:.4g}"); }},
         {"slivers", "slivers", [](const MethodRun& r) { return number(r.result, "slivers", "{:.0f}"); }},
         {"inverted", "inverted", [](const MethodRun& r) { return number(r.result, "inverted", "{:.0f}"); }},
         {"volume_A3", "Å³", [](const MethodRun& r) { return number(r.result, "volume_A3", "{:.6g}"); }},
-        {"volume_error_percent", "volume %", [](const MethodRun& r) { return number(r.result, "volume_error", "{:+.3g}", 100); }},
-        {"hausdorff_A", "distance Å", [](const MethodRun& r) { return number(r.result, "hausdorff_A", "{:.3g}"); }}};
+        {"volume_error_percent", "volume %",
+         [](const MethodRun& r) { return number(r.result, "volume_error", "{:+.3g}", 100); }},
+        {"hausdorff_A", "distance Å",
+         [](const MethodRun& r) { return number(r.result, "hausdorff_A", "{:.3g}"); }}};
     return table;
 }
 
@@ -160,18 +166,19 @@ Image draw_cut_open(const MethodRun& run, int side) {
     o.range_min = 0;
     o.range_max = 70.5;
     const Json& j = run.result;
-    o.title = fmt::format("{}: {} tets, {:.1f}° to {:.1f}°, {:.2g} s", run.method, j["tets"].get<std::uint64_t>(),
-                          j["min_dihedral_deg"].get<double>(), j["max_dihedral_deg"].get<double>(),
-                          seconds_of(j));
+    o.title =
+        fmt::format("{}: {} tets, {:.1f}° to {:.1f}°, {:.2g} s", run.method, j["tets"].get<std::uint64_t>(),
+                    j["min_dihedral_deg"].get<double>(), j["max_dihedral_deg"].get<double>(), seconds_of(j));
     return render(open, o);
 }
 
 }  // namespace
 
 MethodRun run_method(const std::string& in, const std::string& method, const std::string& file,
-                     const std::vector<std::string>& words, const Session& session, const Progress& progress) {
-    std::vector<std::string> command{"vdbgeo", "tetrahedralize", in,     file,
-                                     "--method", method,         "--json", "--quiet"};
+                     const std::vector<std::string>& words, const Session& session,
+                     const Progress& progress) {
+    std::vector<std::string> command{"vdbgeo",   "tetrahedralize", in,       file,
+                                     "--method", method,           "--json", "--quiet"};
     if (session.threads > 0) command.insert(command.end(), {"--threads", fmt::format("{}", session.threads)});
     command.insert(command.end(), words.begin(), words.end());
     MethodRun run{method, file, "", 0, {}};

@@ -88,7 +88,8 @@ bool has_flat_face(const TriMesh& mesh) {
 }
 
 /// The surface that is filled: the input itself, the labels' smooth ones, or of a map one whose triangles are
-/// well shaped. Where rounding leaves a triangle of that flat, a radius a tenth smaller gives other triangles.
+/// well shaped. Where rounding leaves a triangle of that flat, a radius a tenth smaller gives other
+/// triangles.
 TriMesh surface_to_fill(const TetInput& input, const TetFlags& flags, const TetComponentFilter& filter,
                         const Progress& progress) {
     if (input.source != TetSource::map) return input.surface;

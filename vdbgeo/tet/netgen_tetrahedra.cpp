@@ -1,5 +1,6 @@
 #include "vdbgeo/tet/netgen_tetrahedra.h"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
+#include <new>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -55,6 +57,50 @@ namespace {
 
 constexpr VertexId none = 0xFFFFFFFFu;
 
+/// NetGen's library, loaded when it is first needed: linked, it would bring a hundred libraries (OpenCASCADE,
+/// MPI, Python) and 40 MB into every run of every program. Names are as the Itanium C++ ABI mangles them.
+class Nglib {
+ public:
+    static const Nglib& get() {
+        static const Nglib library;
+        return library;
+    }
+
+    decltype(&nglib::Ng_Init) init;
+    decltype(&nglib::Ng_NewMesh) new_mesh;
+    decltype(&nglib::Ng_AddPoint) add_point;
+    decltype(&nglib::Ng_AddSurfaceElement) add_surface_element;
+    decltype(&nglib::Ng_GenerateVolumeMesh) generate_volume_mesh;
+    decltype(&nglib::Ng_GetNP) points;
+    decltype(&nglib::Ng_GetNE) elements;
+    decltype(&nglib::Ng_GetPoint) point;
+    decltype(&nglib::Ng_GetVolumeElement) volume_element;
+    void (*make_parameters)(void*);  ///< the constructor of Ng_Meshing_Parameters
+
+ private:
+    Nglib() : library_(dlopen(VDBGEO_NGLIB_FILE, RTLD_NOW | RTLD_LOCAL)) {
+        if (!library_) throw InvalidInput(fmt::format("netgen: its library cannot be loaded: {}", dlerror()));
+        find("_ZN5nglib7Ng_InitEv", init);
+        find("_ZN5nglib10Ng_NewMeshEv", new_mesh);
+        find("_ZN5nglib11Ng_AddPointEPPvPd", add_point);
+        find("_ZN5nglib20Ng_AddSurfaceElementEPPvNS_23Ng_Surface_Element_TypeEPi", add_surface_element);
+        find("_ZN5nglib21Ng_GenerateVolumeMeshEPPvPNS_21Ng_Meshing_ParametersE", generate_volume_mesh);
+        find("_ZN5nglib8Ng_GetNPEPPv", points);
+        find("_ZN5nglib8Ng_GetNEEPPv", elements);
+        find("_ZN5nglib11Ng_GetPointEPPviPd", point);
+        find("_ZN5nglib19Ng_GetVolumeElementEPPviPi", volume_element);
+        find("_ZN5nglib21Ng_Meshing_ParametersC1Ev", make_parameters);
+    }
+
+    template <class Function>
+    void find(const char* name, Function& function) {
+        function = reinterpret_cast<Function>(dlsym(library_, name));
+        if (!function) throw InvalidInput(fmt::format("netgen: its library has no {}", name));
+    }
+
+    void* library_;
+};
+
 /// The surface of one solid: shell and cavities, turned outward of it.
 struct SolidSurface {
     std::vector<VertexId> points;  ///< of the whole surface, ascending
@@ -96,29 +142,33 @@ double longest_extent(const SolidInput& input, const SolidSurface& solid) {
 }
 
 nglib::Ng_Mesh* surface_of(const SolidInput& input, const SolidSurface& solid) {
-    nglib::Ng_Init();
-    nglib::Ng_Mesh* mesh = nglib::Ng_NewMesh();
+    const Nglib& library = Nglib::get();
+    library.init();
+    nglib::Ng_Mesh* mesh = library.new_mesh();
     for (const VertexId v : solid.points) {
         Vec3d p = input.points[v];
-        nglib::Ng_AddPoint(mesh, p.data());
+        library.add_point(mesh, p.data());
     }
     for (const Triangle& t : solid.triangles) {
         int corners[3];
         for (std::size_t k = 0; k < 3; ++k) corners[k] = static_cast<int>(t[k]) + 1;
-        nglib::Ng_AddSurfaceElement(mesh, nglib::NG_TRIG, corners);
+        library.add_surface_element(mesh, nglib::NG_TRIG, corners);
     }
     return mesh;
 }
 
 void generate(nglib::Ng_Mesh* mesh, const NetgenOptions& options, double extent) {
-    nglib::Ng_Meshing_Parameters parameters;
+    const Nglib& library = Nglib::get();
+    alignas(nglib::Ng_Meshing_Parameters) std::byte memory[sizeof(nglib::Ng_Meshing_Parameters)];
+    library.make_parameters(memory);
+    auto& parameters = *std::launder(reinterpret_cast<nglib::Ng_Meshing_Parameters*>(memory));
     parameters.maxh = options.max_edge_A.value_or(extent);
     parameters.grading = options.grading;
     parameters.optsteps_3d = options.optimisation_rounds;
     parameters.optvolmeshenable = options.optimisation_rounds > 0;
     parameters.check_overlap = 0;
     parameters.check_overlapping_boundary = 0;
-    const nglib::Ng_Result result = nglib::Ng_GenerateVolumeMesh(mesh, &parameters);
+    const nglib::Ng_Result result = library.generate_volume_mesh(mesh, &parameters);
     if (result == nglib::NG_SURFACE_INPUT_ERROR)
         throw InvalidInput("it does not take this surface; try repair");
     if (result != nglib::NG_OK)
@@ -133,16 +183,17 @@ std::vector<std::byte> run_netgen(const SolidInput& input, const SolidSurface& s
                                   const NetgenOptions& options) {
     nglib::Ng_Mesh* mesh = surface_of(input, solid);
     generate(mesh, options, longest_extent(input, solid));
+    const Nglib& library = Nglib::get();
     Filling filling;
-    filling.points.resize(static_cast<std::size_t>(nglib::Ng_GetNP(mesh)));
+    filling.points.resize(static_cast<std::size_t>(library.points(mesh)));
     for (std::size_t i = 0; i < filling.points.size(); ++i)
-        nglib::Ng_GetPoint(mesh, static_cast<int>(i) + 1, filling.points[i].data());
-    const auto tets = static_cast<std::size_t>(nglib::Ng_GetNE(mesh));
+        library.point(mesh, static_cast<int>(i) + 1, filling.points[i].data());
+    const auto tets = static_cast<std::size_t>(library.elements(mesh));
     if (tets > options.max_tets)
         throw NumericalError(fmt::format("more than {} tetrahedra, the limit", options.max_tets));
     for (std::size_t t = 0; t < tets; ++t) {
         int c[NG_VOLUME_ELEMENT_MAXPOINTS];
-        nglib::Ng_GetVolumeElement(mesh, static_cast<int>(t) + 1, c);
+        library.volume_element(mesh, static_cast<int>(t) + 1, c);
         // NetGen's corners run the other way round.
         filling.tets.push_back(
             {VertexId(c[1] - 1), VertexId(c[0] - 1), VertexId(c[2] - 1), VertexId(c[3] - 1)});
@@ -206,6 +257,7 @@ TetMesh netgen_tetrahedra(const TriMesh& surface, const NetgenOptions& options, 
     options.check();
     const SolidInput input = solid_input(surface, stage, progress.part(0, 0.05));
     const std::vector<SolidSurface> solids = part(input);
+    Nglib::get();  // before the processes part
     const std::vector<Filling> fillings = fill(input, solids, options, progress.part(0.05, 0.95));
     Filling all;
     all.points = input.points;

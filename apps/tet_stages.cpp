@@ -91,8 +91,9 @@ bool has_flat_face(const TriMesh& mesh) {
 /// well shaped. Where rounding leaves a triangle of that flat, a radius a tenth smaller gives other
 /// triangles.
 TriMesh surface_to_fill(const TetInput& input, const TetFlags& flags, const TetComponentFilter& filter,
-                        const Progress& progress) {
+                        Session& session) {
     if (input.source != TetSource::map) return input.surface;
+    const Progress progress = session.stage("surface");
     DelaunaySurfaceOptions o = flags.surface(input.unit_A);
     o.isovalue = input.isovalue;
     constexpr int most_tries = 4;
@@ -174,11 +175,11 @@ TetResult make_tets(const TetInput& input, const std::string& method, const TetF
     Clock clock;
     naming(input.file, [&] {
         if (method == "tetgen" || method == "netgen") {
-            const TriMesh surface = surface_to_fill(input, flags, filter, session.stage("surface"));
+            const TriMesh surface = surface_to_fill(input, flags, filter, session);
             result.surface_seconds = clock.lap();
             if (method == "tetgen") {
                 TetgenOptions o = flags.tetgen();
-                o.size = size_field(input, flags, session.stage("sizes"));
+                if (!flags.size_by().empty()) o.size = size_field(input, flags, session.stage("sizes"));
                 result.mesh = tetgen_tetrahedra(surface, o, session.stage("tetgen"));
             } else {
                 result.mesh = netgen_tetrahedra(surface, flags.netgen(input.unit_A), session.stage("netgen"));

@@ -58,9 +58,10 @@ TEST_F(Tetrahedralize, OptimizingRaisesTheAngles) {
     const std::string map = phantom("ball.mrc", 28);
     const Words words{"tetrahedralize", map, at("a.vtu"), "--iso", "0", "--quiet"};
     Words better = words;
-    better.push_back("--optimize");
+    better.insert(better.end(), {"--optimize", "--optimize-bounds", "28:125"});
     const Json before = json(words), after = json(better);
-    EXPECT_GT(after["min_dihedral_deg"].get<double>(), before["min_dihedral_deg"].get<double>() + 1);
+    EXPECT_GT(after["min_dihedral_deg"].get<double>(), before["min_dihedral_deg"].get<double>() + 3);
+    EXPECT_LT(after["max_dihedral_deg"].get<double>(), before["max_dihedral_deg"].get<double>() - 3);
     EXPECT_GT(after["optimize"]["moves"].get<int>() + after["optimize"]["flips"].get<int>(), 0);
     expect_sound(after, 0.02);
 }
@@ -141,9 +142,10 @@ TEST_F(Tetrahedralize, LabelsBecomeRegions) {
     bool between = false;
     for (const auto& pair : mesh.face_regions) between = between || (pair[0] == 1 && pair[1] == 2);
     EXPECT_TRUE(between);
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.msh"), "--labels", "7"}), 3, map, "7");
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.msh"), "--labels", "all", "--method", "stuffing"}), 2,
-                 "--method stuffing");
+    expect_error(vdbgeo({"tetrahedralize", map, at("x.msh"), "--labels", "7", "--quiet"}), 3, map, "7");
+    expect_error(
+        vdbgeo({"tetrahedralize", map, at("x.msh"), "--labels", "all", "--method", "stuffing", "--quiet"}), 2,
+        "--method stuffing");
 }
 
 TEST_F(Tetrahedralize, BadSurfacesAreRefusedByName) {
@@ -163,24 +165,27 @@ TEST_F(Tetrahedralize, BadSurfacesAreRefusedByName) {
     for (const auto& c : cases) {
         const std::string in = mesh_file(c.name, c.mesh);
         for (const std::string method : {"tetgen", "netgen"})
-            expect_error(vdbgeo({"tetrahedralize", in, at("x.vtu"), "--method", method}), 3, in, c.reason);
+            expect_error(vdbgeo({"tetrahedralize", in, at("x.vtu"), "--method", method, "--quiet"}), 3, in,
+                         c.reason);
         EXPECT_FALSE(std::filesystem::exists(at("x.vtu")));
     }
     const std::string claims = make("claims.ply",
                                     "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\n"
                                     "property float x\nproperty float y\nproperty float z\n"
                                     "element face 0\nproperty list uchar int vertex_indices\nend_header\n");
-    expect_error(vdbgeo({"tetrahedralize", claims, at("x.vtu")}), 3, claims);
+    expect_error(vdbgeo({"tetrahedralize", claims, at("x.vtu"), "--quiet"}), 3, claims);
 }
 
 TEST_F(Tetrahedralize, WhatCannotBeDoneEndsWithAReason) {
     const std::string map = phantom("ball.mrc", 24);
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "1e6"}), 5, map, "1e+06");
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "0", "--max-tets", "10"}), 5, map,
-                 "10");
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "0", "--cell", "500"}), 5, map);
-    expect_error(vdbgeo({"tetrahedralize", at("none.mrc"), at("x.vtu")}), 4, at("none.mrc"));
-    expect_error(vdbgeo({"tetrahedralize", map, at("nowhere/x.vtu"), "--iso", "0"}), 4, at("nowhere/x.vtu"));
+    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "1e6", "--quiet"}), 5, map, "1e+06");
+    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "0", "--max-tets", "10", "--quiet"}), 5,
+                 map, "10");
+    expect_error(vdbgeo({"tetrahedralize", map, at("x.vtu"), "--iso", "0", "--cell", "500", "--quiet"}), 5,
+                 map);
+    expect_error(vdbgeo({"tetrahedralize", at("none.mrc"), at("x.vtu"), "--quiet"}), 4, at("none.mrc"));
+    expect_error(vdbgeo({"tetrahedralize", map, at("nowhere/x.vtu"), "--iso", "0", "--quiet"}), 4,
+                 at("nowhere/x.vtu"));
     EXPECT_FALSE(std::filesystem::exists(at("x.vtu")));
 }
 
@@ -201,7 +206,7 @@ TEST_F(Tetrahedralize, FlagsOfAnotherMethodAreRefused) {
     refused({"--method", "cgal", "--size-by", "curvature"}, "--size-by");
     refused({"--compare", "--method", "cgal"}, "--method");
     refused({"--keep-largest", "0"}, "keep the largest 0");
-    expect_error(vdbgeo({"tetrahedralize", map, at("x.ply")}), 2, at("x.ply"), ".vtu");
+    expect_error(vdbgeo({"tetrahedralize", map, at("x.ply"), "--quiet"}), 2, at("x.ply"), ".vtu");
 }
 
 }  // namespace

@@ -527,10 +527,11 @@ void Mesher::perturb(double bound, const Visitor& visitor) {
     for (const double step : {1.0, bound}) {
         Perturber perturber(complex_, domain_, Steps(bound, triangulation(), step));
         const auto add = [&](auto* perturbation) { perturber.add_perturbation(perturbation); };
-        add(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, Steps>(40, 0.05));
-        add(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, Steps>(40, 0.05));
-        add(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, Steps>(40, 0.05));
-        add(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, Steps>(step < bound ? 100 : 30, 0.15));
+        const bool last = step == bound;
+        add(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, Steps>(last ? 20 : 40, 0.05));
+        add(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, Steps>(last ? 10 : 40, 0.05));
+        add(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, Steps>(last ? 20 : 40, 0.05));
+        add(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, Steps>(last ? 20 : 100, 0.15));
         if (run_limited(perturber, visitor) == CGAL::BOUND_REACHED) break;
     }
 }

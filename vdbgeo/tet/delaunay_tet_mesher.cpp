@@ -391,7 +391,7 @@ class Mesher final : public TetMesher {
     Triangulation& triangulation() { return complex_.triangulation(); }
     void refine_once(bool manifold);
     template <class Optimizer>
-    void run_limited(Optimizer& optimizer, const Visitor& visitor);
+    CGAL::Mesh_optimization_return_code run_limited(Optimizer& optimizer, const Visitor& visitor);
     template <class Move>
     void smooth(const Visitor& visitor);
     void perturb(double bound, const Visitor& visitor);
@@ -489,13 +489,13 @@ std::vector<char> Mesher::seeds_met() const {
 /// Without a limit of time the result is always the same. CGAL's threads cannot be interrupted: they get
 /// longer and longer turns.
 template <class Optimizer>
-void Mesher::run_limited(Optimizer& optimizer, const Visitor& visitor) {
-    double turn = 1;
-    do {
+CGAL::Mesh_optimization_return_code Mesher::run_limited(Optimizer& optimizer, const Visitor& visitor) {
+    for (double turn = 1;; turn *= 2) {
         watch_.check(0);
         optimizer.set_time_limit(parallel ? std::min(turn, watch_.seconds_left() + 0.01) : 0);
-        turn *= 2;
-    } while (optimizer(visitor) == CGAL::TIME_LIMIT_REACHED);
+        const auto end = optimizer(visitor);
+        if (end != CGAL::TIME_LIMIT_REACHED) return end;
+    }
 }
 
 template <class Move>
@@ -511,25 +511,28 @@ void Mesher::smooth(const Visitor& visitor) {
 using Angle = CGAL::Mesh_3::Min_dihedral_angle_criterion<Triangulation>;
 
 /// CGAL's perturber goes from bound to bound in steps of this criterion's unit and ends at the first that
-/// some vertex cannot reach. With the bound as its unit it takes one step, and the others are not held up.
-class OneStep final : public Angle {
+/// some vertex cannot reach. With the bound as its unit it takes one step.
+class Steps final : public Angle {
  public:
-    using Angle::Angle;
-    double get_perturbation_unit() const override { return sliver_bound(); }
+    Steps(double bound, const Triangulation& t, double step) : Angle(bound, t), step_(step) {}
+    double get_perturbation_unit() const override { return step_; }
+
+ private:
+    double step_;
 };
 
+/// First as CGAL does; what the vertices that cannot be helped have held up is then tried at the last bound.
 void Mesher::perturb(double bound, const Visitor& visitor) {
-    using Perturber = CGAL::Mesh_3::Sliver_perturber<Complex, Domain, OneStep, Visitor>;
-    constexpr double step = 2;
-    for (double reach = std::fmod(bound, step) > 0 ? std::fmod(bound, step) : step; reach <= bound + 1e-9;
-         reach += step) {
-        Perturber perturber(complex_, domain_, OneStep(reach, triangulation()));
+    using Perturber = CGAL::Mesh_3::Sliver_perturber<Complex, Domain, Steps, Visitor>;
+    for (const double step : {1.0, bound}) {
+        Perturber perturber(complex_, domain_, Steps(bound, triangulation(), step));
         const auto add = [&](auto* perturbation) { perturber.add_perturbation(perturbation); };
-        add(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, OneStep>(40, 0.05));
-        add(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, OneStep>(40, 0.05));
-        add(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, OneStep>(40, 0.05));
-        add(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, OneStep>(100, 0.15));
-        run_limited(perturber, visitor);
+        const bool last = step == bound;
+        add(new CGAL::Mesh_3::Sq_radius_perturbation<Complex, Domain, Steps>(last ? 20 : 40, 0.05));
+        add(new CGAL::Mesh_3::Volume_perturbation<Complex, Domain, Steps>(last ? 10 : 40, 0.05));
+        add(new CGAL::Mesh_3::Dihedral_angle_perturbation<Complex, Domain, Steps>(last ? 20 : 40, 0.05));
+        add(new CGAL::Mesh_3::Li_random_perturbation<Complex, Domain, Steps>(last ? 20 : 100, 0.15));
+        if (run_limited(perturber, visitor) == CGAL::BOUND_REACHED) break;
     }
 }
 

@@ -387,7 +387,7 @@ TEST_F(DelaunayTetrahedra, OfRealLabelsMissNone) {
 TEST_F(DelaunayTetrahedra, FillAClosedSurface) {
     const TriMesh surface = closed_cubes(sphere_map(12), 0);
     Options options;
-    options.facet_size = options.cell_size = 2;
+    options.facet_size = options.cell_size = 1.5;
     options.facet_distance = 0.1;
     const TetMesh mesh = delaunay_tetrahedra(surface, options);
     expect_sound(mesh);

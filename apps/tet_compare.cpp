@@ -156,7 +156,8 @@ Image draw_cut_open(const MethodRun& run, int side) {
     cut.plane.emplace();
     cut.plane->point = (low + high) / 2;
     cut.plane->normal = -Vec3d::UnitY();  // the half before the viewer goes
-    const TriMesh open = cutaway(mesh, cut);
+    TriMesh open = cutaway(mesh, cut);
+    open.vertex_properties.clear();  // each face in the one colour of its tetrahedron
     RenderOptions o;
     o.width = o.height.emplace(side);
     o.view = "front";

@@ -9,9 +9,10 @@ using namespace vdbgeo::test;
 
 namespace {
 
-const Words all_commands{"info",      "convert", "phantom",  "denoise",  "edges",  "transform", "flow",
-                         "surface",   "remesh",  "simplify", "smooth",   "repair", "measure",   "components",
-                         "curvature", "pockets", "cutaway",  "validate", "render", "model"};
+const Words all_commands{"info",     "convert",    "phantom",   "denoise",  "edges",          "transform",
+                         "flow",     "surface",    "remesh",    "simplify", "smooth",         "repair",
+                         "measure",  "components", "curvature", "pockets",  "tetrahedralize", "cutaway",
+                         "validate", "render",     "model"};
 
 struct Promise {
     const char* command;
@@ -43,6 +44,9 @@ const std::vector<Promise> promises{
     {"pockets",
      {"in 1/Å", "in Å²", "in Å [", "--list UINT=20", "--protrusions", "--ambient-radius", "--picture"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
+    {"tetrahedralize",
+     {"--iso TEXT=auto", "in voxels (of a mesh: mean edges), or in Å", "in degrees", "in Å³", "in seconds",
+      "--coarsening INT=3", "--optimize-bounds TEXT=20:130", "[stuffing for a map"}},
     {"cutaway",
      {"--plane TEXT=y", "x,y,z in Å", "in Å³", "--at FLOAT=0.5", "--property TEXT=min_dihedral_deg",
       "--width INT=1600", "PNG"}},

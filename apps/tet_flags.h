@@ -64,13 +64,21 @@ class TetFlags {
     double size_high() const { return size_high_; }
 
  private:
+    /// Larger triangles than a surface for looking at has, and nearer to the isosurface: volumes count here.
+    static DelaunaySurfaceOptions coarse_but_near() {
+        DelaunaySurfaceOptions o;
+        o.radius = 1.2;
+        o.distance = 0.2;
+        return o;
+    }
+
     std::optional<double> angle_, radius_edge_, min_dihedral_, sliver_bound_, max_volume_;
     LengthFlag cell_, radius_, distance_, cell_size_, max_edge_;
     StuffingOptions stuffing_;
     DelaunayTetrahedraOptions delaunay_;
     TetgenOptions tetgen_;
     NetgenOptions netgen_;
-    DelaunaySurfaceOptions surface_;
+    DelaunaySurfaceOptions surface_ = coarse_but_near();
     TetOptimizeOptions optimize_;
     bool split_surface_ = false;
     std::string size_by_, size_range_;

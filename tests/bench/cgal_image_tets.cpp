@@ -30,9 +30,10 @@ ImageTets cgal_image_tets(const std::vector<float>& values, const Vec3i& size, d
                           double angle_deg, double facet_size, double facet_distance, double radius_edge,
                           double cell_size, bool parallel) {
     namespace param = CGAL::parameters;
-    const Domain domain = Domain::create_gray_image_mesh_domain(
-        image_of(values, size, voxel), param::iso_value = isovalue, param::value_outside = isovalue - 1,
-        param::relative_error_bound = 1e-5);
+    const CGAL::Image_3 image = image_of(values, size, voxel);  // the domain keeps a reference to it
+    const Domain domain = Domain::create_gray_image_mesh_domain(image, param::iso_value = isovalue,
+                                                                param::value_outside = isovalue - 1,
+                                                                param::relative_error_bound = 1e-5);
     const auto run = [&](auto tag) {
         using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, CGAL::Default, decltype(tag)>::type;
         using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;

@@ -1,164 +1,155 @@
-// vdbgeo model: the whole protocol on one map, from file to surface, numbers and picture.
+// vdbgeo model: the whole protocol on one map, from file to surface, numbers, tetrahedra, pictures and
+// report.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/command.h"
 #include "apps/flags.h"
-#include "apps/reports.h"
-#include "apps/stages.h"
-#include "converters/mesh_file.h"
-#include "vdbgeo/core/atomic_file.h"
-#include "vdbgeo/core/errors.h"
-#include "vdbgeo/view/png.h"
+#include "apps/model_options.h"
+#include "apps/model_run.h"
+#include "apps/model_stages.h"
 
 namespace vdbgeo::app {
 namespace {
 
-namespace fs = std::filesystem;
+/// Flags of the command itself that are options of a stage: they are passed on as they are typed.
+struct PassedOn {
+    std::string stage;
+    std::vector<CLI::Option*> options;
+};
 
-struct ModelOptions {
-    std::string in, folder;
+struct ModelFlags {
+    ModelOptions options;
+    std::string config;
+    std::vector<std::string> set, skip;
     MapFlags map;
     IsoFlag iso;
     VdbWriteOptions vdb;
     RenderOptions render;
+    std::vector<PassedOn> passed_on;
 };
 
-/// What the stages hand on to each other.
-struct Model {
-    const ModelOptions& options;
-    MapFile map;
-    Surface surface;
-    MeshMeasures measures;
-
-    fs::path out(const std::string& name) const { return fs::path(options.folder) / name; }
-};
-
-/// A stage works on the model and tells its options, numbers and files.
-struct Stage {
-    std::string name;
-    std::function<Json(Model&, const Progress&)> run;
-};
-
-Json read_stage(Model& m, const Progress& progress) {
-    m.map = read_map(m.options.in, m.options.map.options, progress);
-    Json j = grid_json(m.map.map);
-    j["warnings"] = m.map.warnings;
-    return j;
+/// Runs `add` and notes which options it added to the app.
+void pass_on(CLI::App& app, ModelFlags& flags, const std::string& stage, const std::function<void()>& add) {
+    const auto before = app.get_options();
+    add();
+    PassedOn passed{stage, {}};
+    for (CLI::Option* option : app.get_options())
+        if (std::find(before.begin(), before.end(), option) == before.end()) passed.options.push_back(option);
+    flags.passed_on.push_back(std::move(passed));
 }
 
-Json grid_stage(Model& m, const Progress& progress) {
-    write_vdb({m.map.map.grid}, m.out("density.vdb"), m.options.vdb, progress);
-    return {{"files", {"density.vdb"}}, {"bytes", fs::file_size(m.out("density.vdb"))}};
-}
-
-Json surface_stage(Model& m, const Progress& progress) {
-    const Isovalue rule = m.options.iso.parse();
-    m.surface = extract_surface(m.options.in, m.map, rule, progress.part(0, 0.7));
-    write_mesh(m.surface.mesh, m.out("surface.ply"), {}, progress.part(0.7, 1));
-    return {{"files", {"surface.ply"}},
-            {"method", "marching-cubes"},
-            {"iso", m.surface.isovalue},
-            {"iso_rule", rule.text()}};
-}
-
-Json measure_stage(Model& m, const Progress& progress) {
-    m.measures = measure_mesh(m.surface.mesh, progress);
-    write_angle_histogram(m.measures, m.out("angles.png"));
-    Json j = measures_json(m.measures);
-    j["files"] = {"angles.png"};
-    j["open_at_map_border"] = m.measures.boundary_edges > 0;
-    return j;
-}
-
-Json picture_stage(Model& m, const Progress& progress) {
-    RenderOptions options = m.options.render;
-    if (options.title.empty())
-        options.title = fmt::format("{}, isovalue {:.4g}", fs::path(m.options.in).filename().string(),
-                                    m.surface.isovalue);
-    const Image image = naming(m.options.in, [&] { return render(m.surface.mesh, options, progress); });
-    write_png(image, m.out("surface.png"));
-    return {{"files", {"surface.png"}}};
-}
-
-/// The pipeline. A stage that comes later in the protocol is one more line here.
-const std::vector<Stage>& pipeline() {
-    static const std::vector<Stage> stages{{"map", read_stage},
-                                           {"grid", grid_stage},
-                                           {"surface", surface_stage},
-                                           {"measure", measure_stage},
-                                           {"picture", picture_stage}};
-    return stages;
-}
-
-void make_folder(const std::string& folder) {
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) throw IoError(fmt::format("{}: cannot be made: {}", folder, error.message()));
-}
-
-void run_model(const ModelOptions& o, Session& session) {
-    o.iso.parse();
-    if (!can_render()) session.warn("this build has no ray caster (embree): there will be no picture");
-    Model model{o, {}, {}, {}};
-    // The map is looked at before the folder is made: a bad file leaves nothing behind.
-    Json stages = Json::array();
-    Clock all;
-    for (const Stage& stage : pipeline()) {
-        if (stage.name == "picture" && !can_render()) continue;
-        if (stage.name == "grid") make_folder(o.folder);
-        Clock clock;
-        Json numbers = stage.run(model, session.stage(stage.name));
-        session.end_stage();
-        Json entry{{"name", stage.name}, {"seconds", clock.seconds()}};
-        entry.update(numbers);
-        stages.push_back(entry);
-        if (stage.name == "map")
-            for (const std::string& w : model.map.warnings) session.warn(o.in + ": " + w);
+/// The preset, what the file says over it, and what the command line says over both.
+void gather(ModelFlags& flags, const CLI::App& app) {
+    ModelOptions& o = flags.options;
+    const std::string preset = o.preset;
+    if (!flags.config.empty()) read_config(flags.config, o);
+    if (app.get_option("--preset")->count() > 0) o.preset = preset;
+    for (const PassedOn& passed : flags.passed_on)
+        for (const CLI::Option* option : passed.options) {
+            if (option->count() == 0) continue;
+            const bool flag = option->get_items_expected_max() == 0;
+            const std::string key = option->get_name().substr(2);
+            merge_sections(o.given,
+                           {{passed.stage, {{key, flag ? Json(true) : Json(option->results()[0])}}}});
+        }
+    for (const std::string& text : flags.set) set_option(text, o.given);
+    for (const std::string& stage : flags.skip) {
+        if (!find_stage(stage))
+            throw UsageError(fmt::format("--skip {}: expected one of {}", stage, stage_names()));
+        o.given[stage] = false;
     }
-    Json summary{{"input", o.in},
-                 {"options",
-                  {{"iso", o.iso.text},
-                   {"threshold", o.map.threshold},
-                   {"origin", o.map.origin},
-                   {"voxel_size", o.map.voxel_size},
-                   {"mode0", o.map.mode0},
-                   {"invert", o.map.options.invert}}},
-                 {"versions", versions_json()},
-                 {"seconds", all.seconds()},
-                 {"stages", stages}};
-    write_file(model.out("summary.json"), json_text(summary, 2) + "\n");
-    if (!session.json) {
-        session.say(fmt::format("isovalue    {:.6g} ({})", model.surface.isovalue, o.iso.text));
-        for (const std::string& line : measures_text(model.measures)) session.say(line);
-        if (can_render()) session.say(fmt::format("picture     {}", model.out("surface.png").string()));
-        session.say(fmt::format("numbers     {}", model.out("summary.json").string()));
+    for (const auto& [flag, stage] : {std::pair("--from", o.from), std::pair("--to", o.to)})
+        if (!stage.empty() && !find_stage(stage))
+            throw UsageError(fmt::format("{} {}: expected one of {}", flag, stage, stage_names()));
+    if (o.in.empty()) throw UsageError("a map is needed, or --config with the summary of an earlier model");
+    if (o.in == "-") throw UsageError("-: a model is made of a file, not of a pipe");
+    for (const char* stage : {"map", "surface"})
+        if (o.sections().value(stage, Json(true)) == Json(false))
+            throw UsageError(fmt::format("there is no model without the stage {}", stage));
+}
+
+std::string number_text(const Json& result, const char* key, const char* unit) {
+    return result.contains(key) && result[key].is_number()
+               ? fmt::format("{:.6g}{}", result[key].get<double>(), unit)
+               : std::string("–");
+}
+
+/// What a reader wants to know first.
+void say_summary(const Json& summary, const std::string& folder, Session& session) {
+    const auto path = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
+    for (const Json& entry : summary["stages"]) {
+        const std::string name = entry["name"], status = entry["status"];
+        if (status == "reused") session.say(fmt::format("{:<11} as it was", name));
+        if (!entry.contains("result")) continue;
+        const Json& r = entry["result"];
+        if (name == "surface") session.say(fmt::format("isovalue    {}", number_text(r, "iso", "")));
+        if (name == "measure") {
+            const Json& m = r.contains("files") ? r["files"].back() : r;
+            session.say(fmt::format("surface     {} faces in {} pieces, area {}, volume {}",
+                                    number_text(m, "faces", ""), number_text(m, "components", ""),
+                                    number_text(m, "area_A2", " Å²"), number_text(m, "volume_A3", " Å³")));
+        }
+        if (name == "pockets") session.say(fmt::format("pockets     {}", number_text(r, "pockets", "")));
+        if (name == "tets")
+            session.say(fmt::format("tetrahedra  {}, dihedral angles {} to {}", number_text(r, "tets", ""),
+                                    number_text(r, "min_dihedral_deg", "°"),
+                                    number_text(r, "max_dihedral_deg", "°")));
+        if (name == "report") session.say(fmt::format("report      {}", path("report.html")));
     }
-    say_where_open(model.measures, session);
-    session.result(summary);
+    session.say(fmt::format("numbers     {}", path("summary.json")));
+}
+
+void add_flags(CLI::App& app, ModelFlags& flags) {
+    ModelOptions& o = flags.options;
+    app.add_option("map", o.in, "Map (MRC, CCP4) or VDB grid; with --config SUMMARY that of the summary");
+    app.add_option("-o,--out", o.folder, "Folder for the results; made where it is not there")->required();
+    app.add_option("--preset", o.preset,
+                   "What the map is: molecule (published, filtered), tomogram (raw, noisy) or label (a "
+                   "segmentation)")
+        ->check(CLI::IsMember(ModelOptions::presets()).description(""))
+        ->capture_default_str();
+    app.add_option("--config", flags.config,
+                   "JSON file of options, a section a stage, or the summary.json of an earlier model");
+    app.add_option(
+        "--set", flags.set,
+        "STAGE.OPTION=VALUE: an option of a stage's command, such as tets.method=cgal; may be repeated");
+    app.add_option("--skip", flags.skip, "Leave this stage out; may be repeated");
+    app.add_option("--from", o.from,
+                   "Begin with this stage and take what earlier ones left as it is: " + stage_names());
+    app.add_option("--to", o.to, "End with this stage [report]");
+    app.add_flag("--fresh", o.fresh, "Run every stage, also where nothing has changed since the last run");
+    pass_on(app, flags, "surface", [&] { flags.iso.add(app); });
+    pass_on(app, flags, "map", [&] {
+        flags.map.add_reading(app);
+        flags.map.add_sparsify(app);
+        add_vdb_flags(app, flags.vdb);
+    });
+    pass_on(app, flags, "pictures", [&] { add_render_flags(app, flags.render); });
 }
 
 }  // namespace
 
 Command model_command() {
-    return {"model", "The whole protocol on a map: sparse grid, surface, numbers, picture",
-            "  vdbgeo model emd_1080.map -o groel --iso 0.8", [](CLI::App& app) {
-                auto o = std::make_shared<ModelOptions>();
-                app.add_option("map", o->in, "Map (MRC, CCP4) or VDB grid")->required();
-                app.add_option("-o,--out", o->folder, "Folder for the results; made where it is not there")
-                    ->required();
-                o->iso.add(app);
-                o->map.add_reading(app);
-                o->map.add_sparsify(app);
-                add_vdb_flags(app, o->vdb);
-                add_render_flags(app, o->render);
-                return [o](Session& session) {
-                    o->map.finish();
-                    check_usage(o->render);
-                    run_model(*o, session);
-                };
-            }};
+    return {
+        "model",
+        "The whole protocol on a map: grid, noise, surface, curvature, pockets, tetrahedra, pictures, report",
+        "  vdbgeo model emd_1080.map -o groel --iso 0.8\n"
+        "  vdbgeo model tomogram.rec -o tomo --preset tomogram --invert --bin 2\n"
+        "  vdbgeo model emd_1080.map -o groel --iso 0.8 --set remesh.length=3 --set tets.method=cgal\n"
+        "  vdbgeo model other.map -o other --config groel/summary.json",
+        [](CLI::App& app) {
+            auto flags = std::make_shared<ModelFlags>();
+            add_flags(app, *flags);
+            return [flags, &app](Session& session) {
+                gather(*flags, app);
+                const Json summary = run_model(flags->options, session);
+                if (!session.json) say_summary(summary, flags->options.folder, session);
+                session.result(summary);
+            };
+        }};
 }
 
 }  // namespace vdbgeo::app

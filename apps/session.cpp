@@ -42,8 +42,9 @@ double Clock::lap() {
 /// Draws at most ten times a second, from whichever thread reports.
 class Session::Bar {
  public:
-    Bar(std::string name, bool quiet)
-        : name_(std::move(name)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+    /// A passing bar is wiped away at its end.
+    Bar(std::string name, bool quiet, bool passing)
+        : name_(std::move(name)), quiet_(quiet), passing_(passing), terminal_(isatty(STDERR_FILENO) != 0) {}
 
     bool report(double fraction) {
         if (interrupted) return false;
@@ -62,6 +63,7 @@ class Session::Bar {
     }
 
     void end() {
+        if (passing_) return drop();
         if (quiet_ || ended_) return;
         ended_ = true;
         const std::lock_guard<std::mutex> lock(mutex_);
@@ -77,7 +79,7 @@ class Session::Bar {
 
  private:
     const std::string name_;
-    const bool quiet_, terminal_;
+    const bool quiet_, passing_, terminal_;
     Clock clock_;
     double drawn_ = 0, best_ = 0;
     bool ended_ = false;
@@ -86,7 +88,7 @@ class Session::Bar {
 
 Progress Session::stage(const std::string& name) {
     end_stage();
-    bar_ = std::make_shared<Bar>(name, quiet);
+    bar_ = std::make_shared<Bar>(kept_ ? step_ + ": " + name : name, quiet, kept_ != nullptr);
     return Progress([bar = bar_](double fraction) { return bar->report(fraction); });
 }
 
@@ -102,6 +104,7 @@ void Session::drop_stage() {
 
 void Session::say(const std::string& line) {
     end_stage();
+    if (kept_) return;
     if (json || output_taken)
         fmt::print(stderr, "{}\n", line);
     else
@@ -110,12 +113,28 @@ void Session::say(const std::string& line) {
 
 void Session::warn(const std::string& line) {
     end_stage();
-    fmt::print(stderr, "{}: warning: {}\n", program, line);
+    if (kept_)
+        kept_->warnings.push_back(line);
+    else
+        fmt::print(stderr, "{}: warning: {}\n", program, line);
 }
 
 void Session::result(const Json& value) {
     end_stage();
-    if (json) print_out(json_text(value, 2) + "\n");
+    if (kept_)
+        kept_->result = value;
+    else if (json)
+        print_out(json_text(value, 2) + "\n");
+}
+
+Session Session::step(const std::string& name, std::shared_ptr<Kept> kept) const {
+    Session session;
+    session.program = program;
+    session.quiet = quiet;
+    session.threads = threads;
+    session.step_ = name;
+    session.kept_ = std::move(kept);
+    return session;
 }
 
 Session::~Session() { end_stage(); }

@@ -51,11 +51,21 @@ class Session {
     /// The result. Printed as JSON with --json. Throws IoError where standard output is full, as `say` does.
     void result(const Json& json);
 
+    /// A session for a command that runs as a step of this one: it prints nothing but its progress, which is
+    /// wiped away at its end; what it warns of and its result are kept in `kept`.
+    struct Kept {
+        Json result;
+        std::vector<std::string> warnings;
+    };
+    Session step(const std::string& name, std::shared_ptr<Kept> kept) const;
+
     ~Session();
 
  private:
     class Bar;
     std::shared_ptr<Bar> bar_;
+    std::string step_;            ///< name of the step, empty for a session of its own
+    std::shared_ptr<Kept> kept_;  ///< of a step
 };
 
 /// JSON as text; what is not UTF-8 in it (names of files can be anything) becomes U+FFFD.

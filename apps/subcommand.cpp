@@ -1,0 +1,65 @@
+#include "apps/subcommand.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "vdbgeo/core/errors.h"
+
+namespace vdbgeo::app {
+namespace {
+
+std::function<void(Session&)> parse(CLI::App& app, const std::vector<std::string>& words) {
+    const auto body = find_command(words.at(0)).define(app);
+    std::vector<std::string> reversed(words.rbegin(), std::prev(words.rend()));
+    try {
+        app.parse(std::move(reversed));
+    } catch (const CLI::ParseError& e) {
+        throw UsageError(fmt::format("{}: {}", words[0], e.what()));
+    }
+    return body;
+}
+
+}  // namespace
+
+Command find_command(const std::string& name) {
+    for (const Command& command : all_commands())
+        if (command.name == name) return command;
+    throw UsageError(fmt::format("there is no command {}", name));
+}
+
+void check_words(const std::vector<std::string>& words) {
+    CLI::App app;
+    parse(app, words);
+}
+
+Session::Kept run_words(const std::vector<std::string>& words, const std::string& name,
+                        const Session& session) {
+    CLI::App app;
+    const auto body = parse(app, words);
+    const auto kept = std::make_shared<Session::Kept>();
+    Session step = session.step(name, kept);
+    body(step);
+    step.end_stage();
+    return *kept;
+}
+
+std::string command_line(const std::string& program, const std::vector<std::string>& words) {
+    std::string line = program;
+    const auto plain = [](unsigned char c) {
+        return std::isalnum(c) || c > 127 ||
+               std::string("_-+=.,:/@%").find(static_cast<char>(c)) != std::string::npos;
+    };
+    for (const std::string& word : words) {
+        if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) {
+            line += " " + word;
+            continue;
+        }
+        line += " '";
+        for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        line += "'";
+    }
+    return line;
+}
+
+}  // namespace vdbgeo::app

@@ -1,0 +1,26 @@
+// A command as a step of another.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/command.h"
+#include "apps/session.h"
+
+namespace vdbgeo::app {
+
+/// The command of that name.
+Command find_command(const std::string& name);
+
+/// UsageError unless the command `words[0]` takes the other words. Runs nothing.
+void check_words(const std::vector<std::string>& words);
+
+/// Runs a command line in this process and returns its result and its warnings. It throws what the command
+/// throws. `name` is shown with its progress.
+Session::Kept run_words(const std::vector<std::string>& words, const std::string& name,
+                        const Session& session);
+
+/// The words as one would type them: quoted for a shell where that is needed.
+std::string command_line(const std::string& program, const std::vector<std::string>& words);
+
+}  // namespace vdbgeo::app

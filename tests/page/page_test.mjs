@@ -2,7 +2,7 @@
 // Drives a report page in a headless Chromium as a reader would, and checks what the page claims to have: the model,
 // its tetrahedra, pockets, comparisons, tables. Screenshots go to OUTDIR. Exit code 1 and a line for each failure.
 // Environment: VDBGEO_PAGE_MODULES is a node_modules folder with playwright-core; CHROMIUM is the browser.
-import {mkdirSync, statSync, writeFileSync} from "node:fs";
+import {mkdirSync, readFileSync, statSync, writeFileSync} from "node:fs";
 import {createRequire} from "node:module";
 import {resolve} from "node:path";
 import {pathToFileURL} from "node:url";
@@ -32,7 +32,7 @@ const browser = await chromium.launch({
          "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 });
 
-async function open(settings = {}) {
+async function open(settings = {}, file = address, prepare = null) {
   const context = await browser.newContext({viewport: {width: 1280, height: 900}, reducedMotion: "reduce", ...settings});
   context.setDefaultTimeout(10000);
   const page = await context.newPage();
@@ -43,7 +43,8 @@ async function open(settings = {}) {
   });
   page.on("pageerror", (error) => check(false, `uncaught: ${error.stack ?? error}`));
   page.on("request", (request) => check(/^(file|data|blob):/.test(request.url()), `the page asks the network for ${request.url()}`));
-  await page.goto(address);
+  if (prepare) await page.addInitScript(prepare);
+  await page.goto(file);
   return page;
 }
 
@@ -122,11 +123,12 @@ async function check_colours(page, properties) {
 }
 
 async function check_section(page, what) {
+  await page.getByRole("button", {name: "Reset the view"}).click();
   await changes(page, `a section through the ${what}`, () => control(page, "Cut open").check());
   await changes(page, `moving the section of the ${what}`, () => control(page, "At").press("PageUp"));
   await changes(page, `the other side of the ${what}`, () => control(page, "Other side").check());
-  await changes(page, `a section across y through the ${what}`, () => control(page, "Across").selectOption("1"));
   await control(page, "Other side").uncheck();
+  await changes(page, `a section across y through the ${what}`, () => control(page, "Across").selectOption("1"));
   await page.evaluate(() => window.vdbgeo.settled());
   await shot(page, `clip_${what}`);
   await control(page, "Cut open").uncheck();
@@ -217,6 +219,26 @@ async function check_dark() {
   await page.context().close();
 }
 
+// Where the model cannot be shown the poster stays and a line says why; nothing is thrown.
+async function check_without(what, prepare, file = address) {
+  const page = await open({}, file, prepare);
+  await page.waitForSelector("#viewer .viewer-note", {timeout: 20000}).catch(() => check(false, `a line says why ${what} is trouble`));
+  check(await page.locator("#viewer .poster").isVisible(), `the poster stays with ${what}`);
+  check(await page.locator("#viewer .stage").count() === 0 || !await page.locator("#viewer .stage").isVisible(), `no empty canvas with ${what}`);
+  await page.context().close();
+}
+
+async function check_poster() {
+  await check_without("no WebGL", () => {
+    const real = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind === "2d" ? real.call(this, kind, ...rest) : null; };
+  });
+  await check_without("no DecompressionStream", () => { delete window.DecompressionStream; });
+  const damaged = resolve(out, "damaged.html");
+  writeFileSync(damaged, readFileSync(page_file, "utf8").replace(/("data":\s*")[^"]{12}/g, "$1AAAAAAAAAAAA"));
+  await check_without("damaged data", () => {}, pathToFileURL(damaged).href);
+}
+
 try {
   const page = await open({permissions: ["clipboard-read", "clipboard-write"]});
   const has = await claims(page);
@@ -229,6 +251,7 @@ try {
   await page.context().close();
   await check_dark();
   await check_narrow();
+  if (has.viewer) await check_poster();
 } catch (error) {
   check(false, error.stack);
 } finally {

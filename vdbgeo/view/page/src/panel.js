@@ -1,5 +1,5 @@
 // The controls beside the picture. They read and write `state` and call `changed(what)` with what has to be redone:
-// "show", "property", "range", "edges", "clip", or "view:front|side|top|home", "save".
+// "show", "property", "range", "edges", "clip", "clip:afresh" (switched on, or another axis), or "view:front|side|top|home", "save".
 import {words} from "./colours.js";
 import {checkbox, labelled, make, menu} from "./elements.js";
 
@@ -72,14 +72,14 @@ export class Panel {
     const on = checkbox("Cut open", () => {
       state.clip.on = on.box.checked;
       this.fill_clip();
-      this.changed("clip");
+      this.changed("clip:afresh");
     });
     this.clip_on = on.box;
     this.axis = menu([["0", "x"], ["1", "y"], ["2", "z"]], () => {
       state.clip.axis = Number(this.axis.value);
       state.clip.at = (this.box[0][state.clip.axis] + this.box[1][state.clip.axis]) / 2;
       this.fill_clip();
-      this.changed("clip");
+      this.changed("clip:afresh");
     });
     this.at = make("input", {type: "range", oninput: () => {
       state.clip.at = this.at.valueAsNumber;

@@ -41,7 +41,8 @@ function draw_key(g, key, scale, width, ink) {
   if (key.colours) {
     key.colours.forEach((rgb, i) => {
       g.fillStyle = `rgb(${rgb.join(" ")})`;
-      g.fillRect(x + w * i / key.colours.length, y, Math.ceil(w / key.colours.length), 12 * scale);
+      const left = Math.floor(x + w * i / key.colours.length), right = Math.floor(x + w * (i + 1) / key.colours.length);
+      g.fillRect(left, y, right - left, 12 * scale);
     });
     g.fillStyle = ink;
     g.fillText(words(key.range[1]), x + w, y + 27 * scale);

@@ -94,6 +94,9 @@ export class View {
     return Math.min(clientWidth, clientHeight) / (2 * this.half);
   }
 
+  /** The direction to the viewer, at the end of a flight. */
+  towards() { return new Vector3(0, 0, 1).applyQuaternion(this.flight?.to.turn ?? this.turn_now); }
+
   /** By angles about the picture's vertical and horizontal axis. */
   turn(about_vertical, about_horizontal, about_sight = 0) {
     this.flight = null;

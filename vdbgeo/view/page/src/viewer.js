@@ -44,10 +44,11 @@ export class Viewer {
       ranges: new Map(),
       range: (property) => this.state.ranges.get(`${this.state.show}/${property.key}`) ?? property.range ?? [property.low, property.high],
       edges: false,
-      clip: {on: false, axis: 0, at: this.centre[0], flip: false},
+      clip: {on: false, axis: 0, at: this.centre[0], sign: 1, flip: false},
       pocket: null,
     };
     this.jobs = Promise.resolve();
+    this.waiting = new Set();  // what has been asked for and not begun
   }
 
   part() { return this.parts[this.state.show]; }
@@ -115,8 +116,13 @@ export class Viewer {
 
   // One change after the other, since unpacking takes its time; a failure is told and the rest goes on.
   changed(what) {
-    const latest = what;
-    this.jobs = this.jobs.then(() => this.apply(latest)).catch((error) => {
+    if (this.waiting.has(what)) return this.jobs;  // it will find the newest state
+    this.waiting.add(what);
+    this.jobs = this.jobs.then(() => {
+      this.waiting.delete(what);
+      this.note.textContent = "";
+      return this.apply(what);
+    }).catch((error) => {
       this.note.textContent = `This part of the data cannot be shown: ${error.message}`;
     });
     return this.jobs;
@@ -127,7 +133,7 @@ export class Viewer {
     if (verb === "view") this.look(name);
     else if (verb === "save") save(this.compose(...this.paper_and_ink()), `${(this.data.title || "specimen").replace(/[^\w.-]+/g, "_")}.png`);
     else if (verb === "show") await this.show();
-    else if (verb === "clip") this.clip();
+    else if (verb === "clip") this.clip(name === "afresh");
     else if (verb === "edges") this.part().show_edges(this.state.edges);
     else await this.recolour();
     this.view.changed();
@@ -143,14 +149,16 @@ export class Viewer {
       this.note.textContent = "";
     }
     await this.recolour();
-    this.clip();
+    this.clip(false);
     this.part().show_edges(this.state.edges);
     for (const [name, part] of Object.entries(this.parts)) if (part?.mesh) part.mesh.visible = name === show;
   }
 
-  clip() {
-    const {on, axis, at, flip} = this.state.clip;
-    this.part().clip(on ? {axis, at, sign: flip ? -1 : 1} : null);
+  // A new section takes away the side that faces the viewer.
+  clip(afresh) {
+    const {clip} = this.state;
+    if (afresh) clip.sign = this.view.towards().getComponent(clip.axis) < 0 ? -1 : 1;
+    this.part().clip(clip.on ? {axis: clip.axis, at: clip.at, sign: clip.flip ? -clip.sign : clip.sign} : null);
   }
 
   async recolour() {

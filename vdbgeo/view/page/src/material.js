@@ -43,6 +43,10 @@ void main() {
   float light = 0.62 * max(dot(n, key), 0.0) + 0.30 * max(n.z, 0.0) + mix(0.10, 0.22, sky);
   float gloss = 0.10 * pow(max(dot(n, normalize(key + vec3(0.0, 0.0, 1.0))), 0.0), 28.0);
   vec3 colour = base * light + gloss;
+#ifndef FACETS
+  // A hollow without shadows looks like a bump: the inside grows darker with the distance from the cut.
+  if (!gl_FrontFacing) colour *= mix(1.0, 0.38, smoothstep(0.0, 0.75, (plane.w - dot(vPlace, plane.xyz)) / (depths.y - depths.x)));
+#endif
   if (edges > 0.0) {
     vec3 size = fwidth(vCorner);
     vec3 near = smoothstep(vec3(0.0), size * 1.2, vCorner);

@@ -41,7 +41,7 @@ export class Overlay {
   }
 
   update() {
-    const [length, text] = round_length(Math.min(140, this.view.canvas.clientWidth / 4), this.view.pixels_per_unit(), this.unit);
+    const [length, text] = round_length(Math.min(140, this.view.width / 4), this.view.pixels_per_unit(), this.unit);
     this.bar.style.width = `${length * this.view.pixels_per_unit()}px`;
     this.text.textContent = text;
     for (const {i, x, y} of triad(this.view.turn_now)) {

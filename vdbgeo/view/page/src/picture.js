@@ -5,7 +5,7 @@ import {words} from "./colours.js";
 const font = (size, weight = 400) => `${weight} ${size}px system-ui, sans-serif`;
 
 function draw_bar(g, view, unit, scale, height, ink) {
-  const [length, text] = round_length(Math.min(140, view.canvas.clientWidth / 4), view.pixels_per_unit(), unit);
+  const [length, text] = round_length(Math.min(140, view.width / 4), view.pixels_per_unit(), unit);
   const width = length * view.pixels_per_unit() * scale;
   g.fillStyle = ink;
   g.fillRect(16 * scale, height - 18 * scale, width, 3 * scale);
@@ -66,7 +66,7 @@ export function compose(view, {unit, paper, ink, key}) {
   canvas.width = source.width;
   canvas.height = source.height;
   const g = canvas.getContext("2d");
-  const scale = source.width / source.clientWidth;
+  const scale = source.width / view.width;
   g.fillStyle = paper;
   g.fillRect(0, 0, canvas.width, canvas.height);
   g.drawImage(source, 0, 0);

@@ -27,6 +27,8 @@ export class View {
     this.turn_now = new Quaternion();
     this.target = new Vector3();
     this.half = radius;  // half of the smaller side of the picture, in the specimen's unit
+    this.width = 0;  // in CSS pixels, when it was last seen on a screen
+    this.height = 0;
     this.asked = false;
     this.flight = null;
     this.waiting = [];
@@ -36,7 +38,9 @@ export class View {
 
   resize() {
     const {clientWidth, clientHeight} = this.canvas.parentElement;
-    if (!clientWidth || !clientHeight) return;
+    if (!clientWidth || !clientHeight || matchMedia("print").matches) return;
+    this.width = clientWidth;
+    this.height = clientHeight;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.draw();  // at once: the canvas is empty now
@@ -90,8 +94,7 @@ export class View {
   }
 
   pixels_per_unit() {
-    const {clientWidth, clientHeight} = this.canvas;
-    return Math.min(clientWidth, clientHeight) / (2 * this.half);
+    return Math.min(this.width, this.height) / (2 * this.half);
   }
 
   /** The direction to the viewer, at the end of a flight. */
@@ -123,7 +126,7 @@ export class View {
   }
 
   place_camera() {
-    const {clientWidth: w, clientHeight: h} = this.canvas;
+    const {width: w, height: h} = this;
     const unit = this.half / Math.min(w, h);
     const away = 1.05 * this.radius + this.target.length();
     const camera = this.camera;
@@ -141,7 +144,7 @@ export class View {
   }
 
   draw() {
-    if (!this.canvas.clientWidth || !this.canvas.clientHeight) return;
+    if (!this.width) return;
     this.place_camera();
     this.renderer.render(this.scene, this.camera);
     this.on_draw?.();

@@ -96,7 +96,7 @@ export class Viewer {
     addEventListener("beforeprint", () => {
       theme(true);
       this.for_printer?.remove();
-      this.for_printer = this.compose("#fff", "#222");
+      this.for_printer = this.compose("#fff", "#222", null);
       this.for_printer.className = "printed";
       stage.append(this.for_printer);
       theme(false);
@@ -131,7 +131,8 @@ export class Viewer {
   async apply(what) {
     const [verb, name] = what.split(":");
     if (verb === "view") this.look(name);
-    else if (verb === "save") save(this.compose(...this.paper_and_ink()), `${(this.data.title || "specimen").replace(/[^\w.-]+/g, "_")}.png`);
+    else if (verb === "save") save(this.compose(...this.paper_and_ink(), this.picture_key),
+        `${(this.data.title || "specimen").replace(/[^\w.-]+/g, "_")}.png`);
     else if (verb === "show") await this.show();
     else if (verb === "clip") this.clip(name === "afresh");
     else if (verb === "edges") this.part().show_edges(this.state.edges);
@@ -208,7 +209,7 @@ export class Viewer {
     return [style.getPropertyValue("--paper").trim() || "#fff", style.getPropertyValue("--ink").trim() || "#222"];
   }
 
-  compose(paper, ink) { return compose(this.view, {unit: this.unit, paper, ink, key: this.picture_key}); }
+  compose(paper, ink, key) { return compose(this.view, {unit: this.unit, paper, ink, key}); }
 
   async settled() {
     await this.jobs;

@@ -55,7 +55,7 @@ const claims = (page) => page.evaluate(() => {
   const data = element ? JSON.parse(element.textContent) : {};
   const count = (what) => document.querySelectorAll(what).length;
   return {surface: Boolean(data.surface), tets: Boolean(data.tets), viewer: count("#viewer") > 0 && Boolean(data.surface || data.tets),
-          properties: (data.surface?.properties ?? []).map((p) => [p.key, p.kind]), pockets: count("#pocket-table tr[data-pocket]"),
+          properties: (data.surface?.properties ?? []).map((p) => [p.key, p.kind, p.range && p.range[0] < p.range[1]]), pockets: count("#pockets tr[data-pocket]"),
           compares: count("div.compare"), copies: count("button.copy")};
 });
 
@@ -107,10 +107,10 @@ async function check_gestures(page) {
 }
 
 async function check_colours(page, properties) {
-  for (const [key, kind] of properties) {
+  for (const [key, kind, wide] of properties) {
     const now = await changes(page, `colouring by ${key}`, () => control(page, "Colour by").selectOption(key));
     check(await page.locator("#viewer .key").isVisible(), `there is a colour key for ${key}`);
-    if (kind === "category") continue;
+    if (kind === "category" || !wide) continue;
     const high = control(page, "to"), value = Number(await high.inputValue());
     const low = Number(await control(page, "From").inputValue());
     await changes(page, `another range for ${key}`, () => high.fill(String(low + 0.1 * (value - low))));
@@ -136,7 +136,7 @@ async function check_section(page, what) {
 
 async function check_pocket(page) {
   const before = await page.evaluate(() => window.vdbgeo.camera());
-  const row = page.locator('#pocket-table tr[data-pocket][tabindex="0"]').first();
+  const row = page.locator('#pockets tr[data-pocket][tabindex="0"]').first();
   check(await row.count() > 0, "rows of pockets can be chosen");
   if (!await row.count()) return;
   await row.focus();

@@ -46,11 +46,13 @@ function make_surface(faces) {
        help: "How strongly the surface bends: red where it bulges, blue where it is hollow.", ...pack_scalars(heights.map((h) => h / 40))},
       {key: "depth", name: "Depth", unit: "Å", colormap: "sequential", range: [0, 20], help: "How far a point lies below the ball.",
        ...pack_scalars(heights.map((h) => -h))},
+      {key: "nothing", name: "The same everywhere", unit: "", colormap: "sequential", range: [1, 1], help: "A constant.",
+       kind: "scalar", low: 1, high: 1, values: pack_scalars(heights.map((_, i) => (i ? 1 : 0))).values},
       {key: "type", name: "Surface type", unit: "", colormap: "categorical", help: "Peaks, pits and what lies between.",
        classes: [{value: 1, name: "peak"}, {value: 2, name: "saddle"}, {value: 3, name: "pit"}],
        ...pack_classes(heights.map((h) => (h > 1 ? 1 : h > -3 ? 2 : 3)))},
       {key: "pocket", name: "Pockets", unit: "", colormap: "categorical", help: "Each pocket has its own colour.",
-       ...pack_classes(u.map(pocket_of))},
+       ...pack_classes(u.map((v) => pocket_of(v) || 255))},
     ],
   };
 }
@@ -110,19 +112,19 @@ ${[60, 110, 160].map((y) => `<line class="grid" x1="50" x2="390" y1="${y}" y2="$
 function page(data, style, script, {noise}) {
   const cards = [["Volume", "904 800 Å³"], ["Area", "45 240 Å²"], ["Pieces", "1"], ["Genus", "0"], ["Pockets", String(data.pockets.length)]]
       .map(([name, value]) => `<div class="card"><dt>${name}</dt><dd>${value}</dd></div>`).join("");
-  const pockets = data.pockets.map((p) => `<tr data-pocket="${p.id}"><td class="num">${p.id}</td><td class="num">${p.radius.toFixed(1)}</td><td>open to ${p.opening.map((x) => x.toFixed(2)).join(", ")}</td></tr>`).join("");
+  const pockets = data.pockets.map((p) => `<tr data-pocket="${p.id}"><th scope="row" class="number">${p.id}</th><td class="number">${p.radius.toFixed(1)}</td><td>open to ${p.opening.map((x) => x.toFixed(2)).join(", ")}</td></tr>`).join("");
   const compare = ["z", "y", "x"].map((axis) => `<div class="compare" data-axis="${axis}"><img class="before" alt="Section across ${axis}, before" src="${blobs(true)}"><img class="after" alt="Section across ${axis}, after" src="${blobs(false)}"></div>`).join("");
   const sections = [
     ["summary", "Summary", `<dl>${cards}</dl>`],
     data.surface || data.tets ? ["specimen", "Specimen", `<div id="viewer" class="viewer"><img class="poster" alt="The specimen" src="${picture('<circle cx="320" cy="200" r="150" fill="#78abd9"/>', 640, 400)}"></div>`] : null,
-    pockets ? ["pockets", "Pockets", `<button class="copy" data-copy="pocket-table">Copy</button><table class="data" id="pocket-table"><thead><tr><th class="num">Pocket</th><th class="num">Radius (Å)</th><th>Where</th></tr></thead><tbody>${pockets}</tbody></table>`] : null,
+    pockets ? ["pockets", "Pockets", `<button class="copy" data-copy="pocket-table">Copy</button><div class="scroll"><table class="data" id="pocket-table"><thead><tr><th class="number">Pocket</th><th class="number">Radius (Å)</th><th>Where</th></tr></thead><tbody>${pockets}</tbody></table></div>`] : null,
     noise ? ["noise", "Noise", compare] : null,
     ["plots", "Plots", `<figure class="plot">${plot}<figcaption>Densities of the map.</figcaption></figure><figure class="plot">${plot}<figcaption>The same again.</figcaption></figure>`],
-    ["numbers", "Numbers", `<button class="copy" data-copy="measures">Copy</button><table class="data" id="measures"><thead><tr><th>Quantity</th><th class="num">Value</th><th>Unit</th></tr></thead><tbody>${Array.from({length: 40}, (_, i) => `<tr><td>quantity ${i}</td><td class="num">${(i * 3.1416).toFixed(3)}</td><td>Å</td></tr>`).join("")}</tbody></table><details><summary>More</summary><p>Further numbers.</p></details>`],
+    ["numbers", "Numbers", `<button class="copy" data-copy="measures">Copy</button><table class="data" id="measures"><thead><tr><th>Quantity</th><th class="number">Value</th><th>Unit</th></tr></thead><tbody>${Array.from({length: 40}, (_, i) => `<tr><td>quantity ${i}</td><td class="number">${(i * 3.1416).toFixed(3)}</td><td>Å</td></tr>`).join("")}</tbody></table><details><summary>More</summary><p>Further numbers.</p></details>`],
     ["how", "How it was made", `<button class="copy" data-copy="command">Copy</button><pre id="command">vdbgeo model emd.map -o run --preset molecule --a-rather-long-option-that-goes-on-and-on=and/a/path/that/does/not/end</pre>`],
   ].filter(Boolean);
   return `<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>${data.title}</title><style>${style}</style></head>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"><title>${data.title}</title><style>${style}</style></head>
 <body><header class="top"><h1>${data.title}</h1><p class="subtitle">A made-up specimen</p><nav>${sections.map(([id, title]) => `<a href="#${id}">${title}</a>`).join("")}</nav></header>
 <main>${sections.map(([id, title, body]) => `<section id="${id}"><h2>${title}</h2>${body}</section>`).join("\n")}</main>
 <script type="application/json" id="vdbgeo-data">${JSON.stringify(data).replaceAll("</", "<\\/")}</script><script>${script}</script></body></html>`;

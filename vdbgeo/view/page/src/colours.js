@@ -15,10 +15,13 @@ export function colormap(data, name) {
   return Array.from({length: 256}, (_, i) => [i, i, i]);
 }
 
-/** Colour of class `value` of a categorical property; pocket 0 is no pocket. */
+/** Whether a category numbers places on the surface, most of which have none. */
+export const numbers_places = (property) => property.key === "pocket" || property.key === "protrusion";
+
+/** Colour of class `value` of a categorical property; 255 is none. */
 export function class_colour(property, map, value) {
+  if (numbers_places(property) && (value === 255 || value === 0)) return plain;
   if (value === 255) return unknown;
-  if (value === 0 && property.key === "pocket") return plain;
   return map[value % map.length];
 }
 
@@ -28,12 +31,13 @@ export function paint(property, values, range, map) {
   const table = new Uint32Array(top);
   const bytes = new Uint8Array(table.buffer);
   const scale = (property.high - property.low) / 65534;
+  const wide = range[1] > range[0];  // else all have the middle colour
   for (let v = 0; v < top; ++v) {
     let rgb;
     if (property.kind === "category") rgb = class_colour(property, map, v);
     else if (v === 65535) rgb = unknown;
     else {
-      const t = (property.low + v * scale - range[0]) / (range[1] - range[0]);
+      const t = wide ? (property.low + v * scale - range[0]) / (range[1] - range[0]) : 0.5;
       rgb = map[Math.max(0, Math.min(map.length - 1, Math.floor(t * map.length)))];
     }
     bytes[4 * v] = rgb[0]; bytes[4 * v + 1] = rgb[1]; bytes[4 * v + 2] = rgb[2]; bytes[4 * v + 3] = 255;

@@ -1,5 +1,5 @@
 // The colour key under the picture: a bar with numbers, or a list of classes, and the property in plain words.
-import {class_colour, colormap, css, plain, words} from "./colours.js";
+import {class_colour, colormap, css, numbers_places, plain, words} from "./colours.js";
 import {make} from "./elements.js";
 
 const with_unit = (property) => property.name + (property.unit ? ` (${property.unit})` : "");
@@ -7,10 +7,10 @@ const with_unit = (property) => property.name + (property.unit ? ` (${property.u
 /** The classes of a category as [name, colour]; those that have values where the data names none. */
 export function classes_of(property, map, values) {
   const named = property.classes?.length ? property.classes
-      : [...new Set(values)].sort((a, b) => a - b).filter((v) => v !== 255 && !(v === 0 && property.key === "pocket"))
+      : [...new Set(values)].sort((a, b) => a - b).filter((v) => v !== 255 && !(v === 0 && numbers_places(property)))
           .map((value) => ({value, name: String(value)}));
   const list = named.map(({value, name}) => [name, class_colour(property, map, value)]);
-  if (property.key === "pocket" && !named.some((c) => c.value === 0)) list.unshift(["none", plain]);
+  if (numbers_places(property) && !named.some((c) => c.value === 0)) list.unshift(["none", plain]);
   return list;
 }
 

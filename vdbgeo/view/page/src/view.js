@@ -6,7 +6,9 @@ const flight_ms = 600;
 
 /** Turn of a camera that looks against `towards` (the direction to the viewer) with `up` upwards. */
 export function looking(towards, up) {
-  const z = new Vector3(...towards).normalize();
+  const z = new Vector3(...towards);
+  if (!(z.lengthSq() > 0)) z.set(0, 0, 1);
+  z.normalize();
   let y = new Vector3(...up);
   if (y.clone().cross(z).lengthSq() < 1e-6) y = Math.abs(z.y) < 0.9 ? new Vector3(0, 1, 0) : new Vector3(1, 0, 0);
   const x = y.clone().cross(z).normalize();

@@ -198,7 +198,7 @@ export class Viewer {
     }
     if (!pocket) return;
     const target = new Vector3(...pocket.centre.map((x, c) => x - this.centre[c]));
-    const half = Math.min(this.home_half, Math.max(3 * pocket.radius, this.home_half / 12));
+    const half = Math.min(this.home_half, Math.max(3 * (pocket.radius || 0), this.home_half / 12));
     this.view.fly({turn: looking(pocket.opening, this.data.views?.up ?? [0, 0, 1]), target, half});
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.view.canvas.parentElement.scrollIntoView({block: "nearest", behavior: calm ? "auto" : "smooth"});

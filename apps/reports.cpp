@@ -44,7 +44,8 @@ Json versions_json() {
             {"cgal", VDBGEO_CGAL_VERSION},
             {"tetgen", VDBGEO_TETGEN_VERSION},
             {"netgen", VDBGEO_NETGEN_VERSION},
-            {"mpi", VDBGEO_MPI_VERSION}};
+            {"mpi", VDBGEO_MPI_VERSION},
+            {"three.js", VDBGEO_THREE_VERSION}};
 }
 
 std::string versions_text() {

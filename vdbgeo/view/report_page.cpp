@@ -26,10 +26,11 @@ std::string paragraphs(const std::vector<std::string>& texts) {
     return html;
 }
 
-std::string terms(const PageTerms& list, const char* kind) {
+std::string terms(const PageTerms& list, const char* kind, const char* item = "term") {
     std::string html = fmt::format("<dl class=\"{}\">\n", kind);
     for (const auto& [term, text] : list)
-        html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html_text(term), html_text(text));
+        html += fmt::format("<div class=\"{}\"><dt>{}</dt><dd>{}</dd></div>\n", item, html_text(term),
+                            html_text(text));
     return html + "</dl>\n";
 }
 
@@ -108,9 +109,8 @@ std::string figure_html(const PageFigure& figure, const char* kind, std::size_t 
 
 std::string comparison_html(const PageComparison& c) {
     return fmt::format(
-        "<figure class=\"comparison\">\n<div class=\"compare\" data-axis=\"{}\">{}{}</div>\n"
-        "<figcaption>Across {}: before on the left, after on the right.</figcaption>\n</figure>\n",
-        c.axis, image(c.before, "before"), image(c.after, "after"), c.axis);
+        "<div class=\"compare\" data-axis=\"{}\">{}{}</div>\n", c.axis, image(c.before, "before"),
+                       image(c.after, "after"));
 }
 
 std::string stage_html(const PageStage& stage, std::size_t number) {
@@ -247,7 +247,7 @@ std::string cite_html(const ReportContent& c) {
 
 std::vector<Section> sections_of(const ReportContent& c) {
     std::vector<Section> all{
-        {"summary", "Summary", paragraphs(c.summary) + (c.facts.empty() ? "" : terms(c.facts, "facts"))},
+        {"summary", "Summary", paragraphs(c.summary) + (c.facts.empty() ? "" : terms(c.facts, "facts", "card"))},
         {"specimen", "The specimen", specimen_html(c)},
         {"pockets", "Pockets", pockets_html(c)},
         {"noise", "Noise", noise_html(c)},

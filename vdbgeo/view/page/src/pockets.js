@@ -1,7 +1,7 @@
-// Rows of the table of pockets are buttons that show the pocket.
+// Rows of the tables of pockets are buttons that show the pocket.
 
 /** `choose(number)` is called with a pocket's number, or with null when none is chosen any more. */
-export function start_pockets(table, pockets, choose) {
+export function start_pockets(tables, pockets, choose) {
   const rows = new Map();
   let chosen = null;
   const mark = (number) => {
@@ -9,7 +9,7 @@ export function start_pockets(table, pockets, choose) {
     chosen = number;
     choose(number);
   };
-  for (const row of table.querySelectorAll("tr[data-pocket]")) {
+  for (const row of tables.flatMap((table) => [...table.querySelectorAll("tr[data-pocket]")])) {
     const number = Number(row.dataset.pocket);
     if (!pockets.some((p) => p.id === number)) continue;
     rows.set(number, row);
@@ -24,7 +24,9 @@ export function start_pockets(table, pockets, choose) {
     });
   }
   if (!rows.size) return;
-  table.setAttribute("role", "grid");  // rows of plain tables cannot be selected
-  table.setAttribute("aria-label", "Pockets. Enter on a row shows the pocket in the viewer, Escape leaves it");
+  for (const table of tables) {
+    table.setAttribute("role", "grid");  // rows of plain tables cannot be selected
+    table.setAttribute("aria-label", "Pockets. Enter on a row shows the pocket in the viewer, Escape leaves it");
+  }
   document.addEventListener("keydown", (event) => { if (event.key === "Escape" && chosen !== null) mark(null); });
 }

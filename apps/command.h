@@ -40,6 +40,7 @@ Command cutaway_command();
 Command validate_command();
 Command render_command();
 Command model_command();
+Command report_command();
 
 /// Every command, in the order of the help.
 std::vector<Command> all_commands();

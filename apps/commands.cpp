@@ -69,7 +69,7 @@ std::vector<Command> all_commands() {
             remesh_command(),         simplify_command(),   smooth_command(),    repair_command(),
             measure_command(),        components_command(), curvature_command(), pockets_command(),
             tetrahedralize_command(), cutaway_command(),    validate_command(),  render_command(),
-            model_command()};
+            model_command(),          report_command()};
 }
 
 int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program,

@@ -35,8 +35,9 @@ Crop parse_crop(const std::string& text) {
     return crop;
 }
 
-/// "2G", "256M", "1048576".
-std::uint64_t parse_bytes(const std::string& text) {
+}  // namespace
+
+std::uint64_t parse_bytes(const char* flag, const std::string& text) {
     double number = 0;
     const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     const std::string unit(rest, static_cast<std::size_t>(text.data() + text.size() - rest));
@@ -45,10 +46,12 @@ std::uint64_t parse_bytes(const std::string& text) {
                                         (unit.size() == 1 || unit == std::string(1, unit[0]) + "B" ||
                                          unit == std::string(1, unit[0]) + "iB"));
     if (error != std::errc() || !known || !(number > 0 && number < 1e15))
-        throw UsageError(fmt::format("--memory: '{}' is not a size such as 2G or 512M", text));
+        throw UsageError(fmt::format("{}: '{}' is not a size such as 2G or 512M", flag, text));
     const std::size_t power = unit.empty() ? 0 : 10 * (units.find(unit[0]) + 1);
     return static_cast<std::uint64_t>(number * static_cast<double>(std::uint64_t(1) << power));
 }
+
+namespace {
 
 /// "2.5" or "2.5,2.5,3".
 std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
@@ -138,7 +141,7 @@ void MapFlags::finish() {
         }
         if (!quantise.empty()) options.quantise = ThresholdRule::parse(quantise);
         if (!crop.empty()) options.crop = parse_crop(crop);
-        if (!memory.empty()) options.memory = parse_bytes(memory);
+        if (!memory.empty()) options.memory = parse_bytes("--memory", memory);
         if (!voxel_size.empty()) {
             options.mrc.voxel_size_A = parse_triple(voxel_size, true);
             if (!options.mrc.voxel_size_A)

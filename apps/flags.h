@@ -37,6 +37,9 @@ struct IsoFlag {
 /// UsageError where one of these flags was given: `why` tells what it belongs to.
 void refuse_flags(const CLI::App& app, const std::vector<std::string>& names, const std::string& why);
 
+/// A number of bytes: "2G", "256M", "1048576"; a K is 1024. UsageError for anything else.
+std::uint64_t parse_bytes(const char* flag, const std::string& text);
+
 /// A length: "0.8" is in `unit` (voxels, say), "1.5A" in Å; tells whether it was in Å. An empty text leaves
 /// `length` as it is. UsageError for what is no length above 0.
 bool parse_length(const char* flag, const char* unit, const std::string& text, double& length);

@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/curvature_report.h"
 #include "apps/flags.h"
+#include "apps/plots.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
 #include "vdbgeo/measure/adaptive_curvature.h"
@@ -26,7 +27,8 @@ namespace {
 
 struct CurvatureOptions {
     std::string in, out, map, method = "auto";
-    std::string table, histogram;
+    std::string table, histogram, plane;
+    PlotFlags plots;
     std::optional<double> radius, flatness;
     DiscreteCurvatureOptions discrete;
     CurvatureTensorOptions tensor;
@@ -117,8 +119,9 @@ void finish(CurvatureOptions& o, const CLI::App& flags) {
     if (o.flatness && !(*o.flatness >= 0)) throw UsageError("--flatness: expected 0 or more, in 1/Å");
     if (!o.table.empty() && !has_ending(o.table, ".csv"))
         throw UsageError(fmt::format("{}: tables are CSV files: .csv", o.table));
-    if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
-        throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
+    check_plot_output(o.histogram);
+    check_plot_output(o.plane);
+    o.plots.check(!o.histogram.empty() || !o.plane.empty(), "--histogram and --plane");
     o.map_flags.finish();
 }
 
@@ -177,7 +180,7 @@ void warn_where_inward(const TriMesh& mesh, const CurvatureOptions& o, Session& 
 
 void run_curvature(const CurvatureOptions& o, Session& session) {
     check_mesh_output(o.out);
-    for (const std::string& path : {o.out, o.table, o.histogram}) check_folder_of(path);
+    for (const std::string& path : {o.out, o.table, o.histogram, o.plane}) check_folder_of(path);
     for (const char* ending : {".obj", ".off", ".stl"})
         if (has_ending(o.out, ending))
             session.warn(
@@ -202,7 +205,8 @@ void run_curvature(const CurvatureOptions& o, Session& session) {
     attach(mesh, curvature, report.flatness);
     for (const MeshProperty& p : report.sampled) set_vertex_property(mesh, p);
     if (!o.table.empty()) write_curvature_table(report, o.table, session.stage("table"));
-    if (!o.histogram.empty()) write_curvature_histogram(report, o.histogram);
+    if (!o.histogram.empty()) write_drawing(plot_curvature_histogram(report, o.plots.theme()), o.histogram);
+    if (!o.plane.empty()) write_drawing(plot_curvature_plane(report, o.plots.theme()), o.plane);
     write_mesh(mesh, o.out, {}, session.stage("writing"));
     seconds["write"] = clock.lap();
     session.end_stage();
@@ -258,7 +262,8 @@ Command curvature_command() {
     return {
         "curvature", "Curvature, shape index and surface types at the vertices of a mesh",
         "  vdbgeo curvature groel.ply curved.ply --map emd_1080.map\n"
-        "  vdbgeo curvature groel.ply curved.ply --table curved.csv --sample density=emd_1080.map",
+        "  vdbgeo curvature groel.ply curved.ply --table curved.csv --sample density=emd_1080.map\n"
+        "  vdbgeo curvature groel.ply curved.ply --histogram k.svg --plane k1k2.svg",
         [](CLI::App& app) {
             auto o = std::make_shared<CurvatureOptions>();
             app.add_option("in", o->in, "Mesh: " + mesh_endings_text())->required();
@@ -280,7 +285,10 @@ Command curvature_command() {
                 ->capture_default_str();
             app.add_option("--table", o->table, "Write one line a vertex as CSV here");
             app.add_option("--histogram", o->histogram,
-                           "Write the distributions of k1, k2 and H over the area as a PNG here");
+                           "Plot the distributions of k1, k2 and H over the area here (PNG or SVG)");
+            app.add_option("--plane", o->plane,
+                           "Plot the area over k1 and k2 with the surface types here (PNG or SVG)");
+            o->plots.add(app);
             o->map_flags.add_reading(app);
             return [o, flags = &app](Session& session) {
                 finish(*o, *flags);

@@ -95,8 +95,7 @@ void finish(CutawayCommandOptions& o, const CLI::App& flags) {
     if (!o.picture() && !is_mesh_ending(o.out))
         throw UsageError(
             fmt::format("{}: the ending tells the format: .png or {}", o.out, mesh_endings_text()));
-    if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
-        throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
+    check_plot_output(o.histogram);
     o.own_view = flags.get_option("--view")->count() > 0;
     check_usage(o.render);
 }
@@ -273,7 +272,7 @@ Command cutaway_command() {
                 add_cut_flags(app, *o);
                 add_picture_flags(app, *o);
                 app.add_option("--histogram", o->histogram,
-                               "Write the histogram of all dihedral angles of the mesh as a PNG here");
+                               "Plot the histogram of all dihedral angles of the mesh here (PNG or SVG)");
                 return [o, flags = &app](Session& session) {
                     finish(*o, *flags);
                     run_cutaway(*o, session);

@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/flow_flags.h"
 #include "apps/map_filter.h"
+#include "apps/plots.h"
 #include "apps/preview.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
@@ -20,7 +21,8 @@ namespace {
 struct DenoiseOptions {
     MapFilterFlags files;
     DiffusionFlags diffusion;
-    std::string method = "hyperdiffusion";
+    std::string method = "hyperdiffusion", spectra;
+    PlotFlags plots;
     double blur = BilateralOptions().sigma;
     std::optional<double> range;
     int radius = 1;
@@ -49,6 +51,8 @@ void DenoiseOptions::finish(Session& session) {
     files.finish();
     check_flags();
     check_map_output(files.out, session);
+    check_plot_output(spectra);
+    plots.check(!spectra.empty(), "--spectra");
     if (method == "bilateral") check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
         if (!diffusion.orders.empty())
@@ -154,7 +158,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
     Preview preview;
-    const bool shown = !o.files.preview.empty();
+    const bool shown = !o.files.preview.empty() || !o.spectra.empty();
     if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
     const double rms_before = active_moments(*in.map.grid).statistics().rms;
     seconds["preview"] = clock.lap();
@@ -173,8 +177,14 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     write_filtered(o.files, in.map, j, session);
     seconds["write"] = clock.lap();
     if (shown) {
-        preview.write(o.files.preview);
-        j["preview"] = o.files.preview;
+        if (!o.files.preview.empty()) {
+            preview.write(o.files.preview);
+            j["preview"] = o.files.preview;
+        }
+        if (!o.spectra.empty()) {
+            write_drawing(preview.plot_spectra(o.plots.theme()), o.spectra);
+            j["spectra"] = o.spectra;
+        }
     } else {
         seconds.erase("preview");
     }
@@ -192,7 +202,7 @@ Command denoise_command() {
     return {
         "denoise",
         "Take the noise out of a map by hyperdiffusion; or by a Gaussian, a median, a bilateral filter",
-        "  vdbgeo denoise emd_1080.map smooth.mrc --preview smooth.png\n"
+        "  vdbgeo denoise emd_1080.map smooth.mrc --preview smooth.png --spectra spectra.svg\n"
         "  vdbgeo denoise emd_1080.map smooth.vdb --order 1 --sigma local:3 --time 2\n"
         "  vdbgeo denoise emd_1080.map median.mrc --method median --radius 1",
         [](CLI::App& app) {
@@ -218,6 +228,9 @@ Command denoise_command() {
             o->files.add(app,
                          "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
             o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
+            app.add_option("--spectra", o->spectra,
+                           "Plot the radial power spectra before and after here (PNG or SVG)");
+            o->plots.add(app);
             return [o](Session& session) {
                 o->finish(session);
                 run_denoise(*o, session);

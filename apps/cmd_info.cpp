@@ -3,6 +3,7 @@
 
 #include "apps/command.h"
 #include "apps/flags.h"
+#include "apps/plots.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "apps/tet_reports.h"
@@ -12,6 +13,8 @@
 #include "vdbgeo/measure/isovalue_table.h"
 #include "vdbgeo/measure/self_intersections.h"
 #include "vdbgeo/tet/tet_quality.h"
+#include "vdbgeo/volume/density_histogram.h"
+#include "vdbgeo/volume/isovalue.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -19,7 +22,9 @@ namespace {
 struct InfoOptions {
     std::vector<std::string> files;
     bool validate = false, isovalues = false;
-    std::string plot;
+    std::string plot, histogram;
+    PlotFlags plots;
+    IsoFlag iso{""};
     MapFlags map;
 };
 
@@ -87,10 +92,9 @@ Json describe(const std::string& file, const InfoOptions& options, std::vector<s
     return j;
 }
 
-/// Isovalue → volume, area and pieces of the surface, as numbers, as lines and as a picture.
-Json isovalue_rows(const std::string& file, const InfoOptions& options, std::vector<std::string>& lines,
-                   Session& session) {
-    const MapFile in = read_map(file, options.map.options, session.stage("reading"));
+/// Isovalue → volume, area and pieces of the surface, as numbers, as lines and as a plot.
+Json isovalue_rows(const std::string& file, const MapFile& in, const std::optional<MarkedLevel>& level,
+                   const InfoOptions& options, std::vector<std::string>& lines, Session& session) {
     const auto rows = naming(file, [&] { return isovalue_table(in.map, {}, session.stage("surfaces")); });
     session.end_stage();
     Json table = Json::array();
@@ -107,20 +111,61 @@ Json isovalue_rows(const std::string& file, const InfoOptions& options, std::vec
         lines.push_back(fmt::format("{:>12.5g} {:>8.3g} {:>14.6g} {:>14.6g} {:>8}", row.isovalue, sigmas,
                                     row.volume_A3, row.area_A2, row.components));
     }
-    if (!options.plot.empty()) plot_isovalues(rows, options.plot);
+    if (!options.plot.empty()) plot_isovalues(rows, options.plot, level, options.plots.theme());
     return table;
 }
 
+/// How many bars a plot of the usual width has room for.
+constexpr std::size_t density_bins = 220;
+
+/// The histogram of the densities, as numbers and as a plot.
+Json density_counts(const std::string& file, const MapFile& in, const std::optional<MarkedLevel>& level,
+                    const InfoOptions& options, Session& session) {
+    const DensityHistogram h =
+        naming(file, [&] { return density_histogram(in.map, density_bins, session.stage("counting")); });
+    session.end_stage();
+    if (h.non_finite > 0)
+        session.warn(fmt::format("{}: {} voxels are no finite number: left out", file, h.non_finite));
+    if (level && !(level->isovalue >= h.low && level->isovalue <= h.high))
+        session.warn(fmt::format("{}: no density is near the isovalue {:.6g}", file, level->isovalue));
+    write_drawing(plot_densities(h, file, level, options.plots.theme()), options.histogram);
+    return {{"low", h.low}, {"high", h.high}, {"voxels", h.voxels}, {"counts", h.counts}};
+}
+
+/// What is drawn and counted of a map in memory.
+void look_closer(const std::string& file, const InfoOptions& options, Json& j,
+                 std::vector<std::string>& lines, Session& session) {
+    const MapFile in = read_map(file, options.map.options, session.stage("reading"));
+    std::optional<MarkedLevel> level;
+    if (!options.iso.text.empty()) {
+        level = marked_level(naming(file, [&] { return options.iso.parse().resolve(in.map); }),
+                             in.map.statistics);
+        j["iso"] = level->isovalue;
+        lines.push_back(level->label);
+    }
+    if (!options.histogram.empty())
+        j["density_histogram"] = density_counts(file, in, level, options, session);
+    if (options.isovalues) j["isovalues"] = isovalue_rows(file, in, level, options, lines, session);
+}
+
 void check_info(const InfoOptions& options) {
-    if (!options.plot.empty() && !has_ending(options.plot, ".png"))
-        throw UsageError(fmt::format("{}: pictures are PNG files: .png", options.plot));
+    const bool drawn = !options.plot.empty() || !options.histogram.empty();
+    check_plot_output(options.plot);
+    check_plot_output(options.histogram);
+    options.plots.check(drawn, "--histogram and --plot");
     if (!options.isovalues && !options.plot.empty()) throw UsageError("--plot needs --isovalues");
-    if (!options.plot.empty() && options.files.size() > 1)
-        throw UsageError("--plot draws the isovalues of one map");
-    if (options.isovalues)
+    if (!options.iso.text.empty()) {
+        if (!drawn) throw UsageError("--iso: belongs to --histogram and --plot");
+        options.iso.parse();
+    }
+    for (const auto& [path, what] : {std::pair(&options.plot, "--plot draws the isovalues"),
+                                     std::pair(&options.histogram, "--histogram draws the densities")})
+        if (!path->empty() && options.files.size() > 1) throw UsageError(fmt::format("{} of one map", what));
+    const char* const flag = options.isovalues ? "--isovalues" : "--histogram";
+    if (options.isovalues || !options.histogram.empty())
         for (const std::string& file : options.files)
             if (file == "-" || is_mesh_input(file) || is_tet_ending(file))
-                throw UsageError(fmt::format("{}: --isovalues is of maps and grids in files", file));
+                throw UsageError(fmt::format("{}: {} is of maps and grids in files", file, flag));
 }
 
 void run_info(const InfoOptions& options, Session& session) {
@@ -134,7 +179,7 @@ void run_info(const InfoOptions& options, Session& session) {
         Json j = describe(file, options, lines, session);
         if (options.validate && j.contains("departures") && j["departures"].empty())
             lines.emplace_back("departures from MRC2014: none");
-        if (options.isovalues) j["isovalues"] = isovalue_rows(file, options, lines, session);
+        if (options.isovalues || !options.histogram.empty()) look_closer(file, options, j, lines, session);
         if (file != options.files.back()) lines.emplace_back();
         if (!session.json)
             for (const std::string& line : lines) session.say(line);
@@ -148,7 +193,8 @@ void run_info(const InfoOptions& options, Session& session) {
 Command info_command() {
     return {"info", "Header, statistics and topology of maps, grids, meshes and tetrahedra",
             "  vdbgeo info emd_1080.map --validate\n"
-            "  vdbgeo info emd_1080.map --isovalues --plot levels.png",
+            "  vdbgeo info emd_1080.map --isovalues --plot levels.png\n"
+            "  vdbgeo info emd_1080.map --histogram density.svg --iso 0.8",
             [](CLI::App& app) {
                 auto o = std::make_shared<InfoOptions>();
                 app.add_option("files", o->files, "Maps (MRC, CCP4), VDB grids, meshes or tetrahedra")
@@ -156,7 +202,12 @@ Command info_command() {
                 app.add_flag("--validate", o->validate, "List every departure of a map file from MRC2014");
                 app.add_flag("--isovalues", o->isovalues,
                              "A table of a map: isovalue, enclosed volume, area and pieces of the surface");
-                app.add_option("--plot", o->plot, "Draw that table as a PNG here");
+                app.add_option("--plot", o->plot, "Plot that table here (PNG or SVG)");
+                app.add_option("--histogram", o->histogram,
+                               "Plot the histogram of a map's densities here (PNG or SVG): of all samples, "
+                               "of a VDB grid of the active voxels");
+                o->iso.add(app);
+                o->plots.add(app);
                 o->map.add_reading(app);
                 return [o](Session& session) {
                     o->map.finish();

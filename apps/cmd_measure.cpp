@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "apps/command.h"
+#include "apps/plots.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
@@ -15,6 +16,7 @@ namespace {
 struct MeasureOptions {
     std::vector<std::string> in;
     std::string histogram, distance;
+    PlotFlags plots;
 };
 
 Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures& measures, Session& session) {
@@ -43,8 +45,8 @@ Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures&
 }
 
 void run_measure(const MeasureOptions& o, Session& session) {
-    if (!o.histogram.empty() && !has_ending(o.histogram, ".png"))
-        throw UsageError(fmt::format("{}: pictures are PNG files: .png", o.histogram));
+    check_plot_output(o.histogram);
+    o.plots.check(!o.histogram.empty(), "--histogram");
     if (!o.distance.empty() && o.in.size() > 1) throw UsageError("--distance is that of one mesh to another");
     Json all = Json::array();
     std::vector<std::pair<std::string, MeshMeasures>> meshes;
@@ -59,7 +61,7 @@ void run_measure(const MeasureOptions& o, Session& session) {
                                         all.back()["hausdorff_A"].get<double>()));
         if (file != o.in.back()) lines.emplace_back();
     }
-    if (!o.histogram.empty()) write_angle_histograms(meshes, o.histogram);
+    if (!o.histogram.empty()) write_angle_histograms(meshes, o.histogram, o.plots.theme());
     if (!session.json)
         for (const std::string& line : lines) session.say(line);
     session.result(all.size() == 1 ? all[0] : Json{{"files", all}});
@@ -74,8 +76,9 @@ Command measure_command() {
                 app.add_option("meshes", o->in, "Meshes: " + mesh_endings_text())->required();
                 app.add_option(
                     "--histogram", o->histogram,
-                    "Write the histogram of the triangles' angles as a PNG here, of several meshes as "
+                    "Plot the histogram of the triangles' angles here (PNG or SVG), of several meshes as "
                     "curves");
+                o->plots.add(app);
                 app.add_option("--distance", o->distance,
                                "Measure how far the mesh is from this one, both ways, in Å");
                 return [o](Session& session) { run_measure(*o, session); };

@@ -24,6 +24,7 @@ namespace {
 
 struct TetrahedralizeOptions {
     std::string in, out, labels, histogram;
+    PlotFlags plots;
     bool compare = false, no_distance = false;
     std::vector<std::int64_t> wanted;
     MapFlags map;
@@ -109,7 +110,7 @@ void run_tetrahedralize(const TetrahedralizeOptions& o, Session& session) {
     compare_with_surface(input, made.mesh, quality.volume_A3, !o.no_distance, j, lines, session);
     seconds["measure"] = clock.lap();
     write_tets(made.mesh, o.out, session.stage("writing"));
-    if (!o.histogram.empty()) write_dihedral_histogram({{method, quality}}, o.histogram);
+    if (!o.histogram.empty()) write_dihedral_histogram({{method, quality}}, o.histogram, o.plots.theme());
     session.end_stage();
     seconds["write"] = clock.lap();
     j["seconds"] = seconds;
@@ -173,6 +174,8 @@ void run_compare(const TetrahedralizeOptions& o, const CLI::App& flags, Session&
 void check_flags(TetrahedralizeOptions& o, const CLI::App& flags) {
     o.map.finish();
     o.tets.finish(flags);
+    check_plot_output(o.histogram);
+    o.plots.check(!o.histogram.empty(), "--histogram");
     check_usage(o.filter);
     if (o.compare) {
         refuse_flags(flags, {"--method"}, "--compare runs all methods");
@@ -219,7 +222,9 @@ Command tetrahedralize_command() {
                     ->capture_default_str();
                 app.add_flag("--no-distance", o->no_distance,
                              "Do not measure how far the boundary is from the surface");
-                app.add_option("--histogram", o->histogram, "Histogram of the dihedral angles, a .png");
+                app.add_option("--histogram", o->histogram,
+                               "Plot the histogram of the dihedral angles here (PNG or SVG)");
+                o->plots.add(app);
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);
                 return [o, flags = &app](Session& session) {

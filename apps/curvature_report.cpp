@@ -9,9 +9,6 @@
 
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/measure/shape_types.h"
-#include "vdbgeo/view/colormap.h"
-#include "vdbgeo/view/plot.h"
-#include "vdbgeo/view/png.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -41,17 +38,6 @@ Array<double> as_doubles(const std::vector<float>& values) { return {values.begi
 std::uint64_t with_flag(const Curvatures& c, CurvatureFlag flag) {
     return static_cast<std::uint64_t>(
         std::count_if(c.flags.begin(), c.flags.end(), [&](std::uint8_t f) { return f & flag; }));
-}
-
-/// The area by value, in equal bins from low to high; what lies beyond is left out.
-std::vector<double> area_in_bins(const Array<double>& values, const Array<double>& areas, double low,
-                                 double high) {
-    std::vector<double> area(bins, 0.0);
-    for (std::size_t v = 0; v < values.size(); ++v)
-        if (values[v] >= low && values[v] < high)
-            area[std::min(bins - 1, static_cast<std::size_t>((values[v] - low) / (high - low) * bins))] +=
-                areas[v];
-    return area;
 }
 
 /// Σ value · area over the vertices that have a value.
@@ -176,39 +162,6 @@ void write_curvature_table(const CurvatureReport& r, const std::string& path, co
         }
     }
     file.commit();
-}
-
-void write_curvature_histogram(const CurvatureReport& r, const std::string& path) {
-    const Colormap colours("categorical");
-    PlotOptions options;
-    options.title = "Curvature over the surface";
-    options.x_label = "curvature (1/Å)";
-    options.y_label = "share of the area, % a bin";
-    const Curvatures& c = r.curvature;
-    const Array<double> weights = as_weights(r.areas);
-    // One axis for the three: from the least to the greatest of what 98 % of the area has.
-    double low = 0, high = 0;
-    for (const Array<double>* values : {&c.k1, &c.k2}) {
-        const AreaHistogram h = area_histogram(*values, weights, bins);
-        low = std::min(low, h.low);
-        high = std::max(high, h.high);
-    }
-    if (!(low < high)) low = -1, high = 1;
-    options.x_low = low;
-    std::vector<Curve> curves;
-    const std::pair<const char*, const Array<double>*> shown[] = {{"k1", &c.k1}, {"k2", &c.k2}, {"H", &c.H}};
-    for (const auto& [name, values] : shown) {
-        const std::vector<double> area = area_in_bins(*values, weights, low, high);
-        double all = 0;
-        for (const double a : area) all += a;
-        Curve curve{name, {}, {}, colours.category(static_cast<std::int64_t>(curves.size()))};
-        for (std::size_t b = 0; b < bins; ++b) {
-            curve.x.push_back(low + (static_cast<double>(b) + 0.5) * (high - low) / bins);
-            curve.y.push_back(all > 0 ? 100 * area[b] / all : 0);
-        }
-        curves.push_back(std::move(curve));
-    }
-    write_png(plot_curves(curves, false, options), path);
 }
 
 }  // namespace vdbgeo::app

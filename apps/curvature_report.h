@@ -6,6 +6,8 @@
 
 #include "apps/session.h"
 #include "vdbgeo/measure/curvature.h"
+#include "vdbgeo/view/drawing.h"
+#include "vdbgeo/view/theme.h"
 
 namespace vdbgeo::app {
 
@@ -31,7 +33,10 @@ std::vector<std::string> curvature_text(const CurvatureReport& report);
 /// One line a vertex as CSV: place, area, normal curvature values, directions, type, flags, sampled values.
 void write_curvature_table(const CurvatureReport& report, const std::string& path, const Progress& progress);
 
-/// The distributions of k1, k2 and H over the area (cf. the paper's Figs 11–14) as a PNG.
-void write_curvature_histogram(const CurvatureReport& report, const std::string& path);
+/// The distributions of k1, k2 and H over the area (cf. the paper's Figs 11–14).
+Drawing plot_curvature_histogram(const CurvatureReport& report, const Theme& theme = Theme::light());
+
+/// The area over the plane of k1 and k2, with the borders and the names of the surface types.
+Drawing plot_curvature_plane(const CurvatureReport& report, const Theme& theme = Theme::light());
 
 }  // namespace vdbgeo::app

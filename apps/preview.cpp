@@ -130,7 +130,7 @@ void Preview::draw_section(Image& image, const Row& row, const Section& section,
     }
 }
 
-Image Preview::draw_spectra(int width) const {
+Drawing Preview::plot_spectra(const Theme& theme, int width, int height) const {
     const Colormap colours("categorical");
     std::vector<Curve> curves;
     for (std::size_t i = 0; i < rows_.size(); ++i)
@@ -139,12 +139,15 @@ Image Preview::draw_spectra(int width) const {
              i == 0 ? Vec3f::Constant(0.55f) : colours.category(static_cast<std::int64_t>(i - 1))});
     PlotOptions options;
     options.width = width;
-    options.height = 460;
+    options.height = height;
+    options.theme = theme;
     options.title = "Radial power spectrum";
     options.x_label = "spatial frequency (1/Å)";
-    options.y_label = "power";
+    options.y_label = "power (the map's units squared)";
     return plot_curves(curves, true, options);
 }
+
+Image Preview::draw_spectra(int width) const { return rasterise(plot_spectra(Theme::light(), width, 460)); }
 
 Image Preview::draw() const {
     // One scale: the rows fill the width, unless that makes them too high.

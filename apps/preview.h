@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "vdbgeo/core/progress.h"
-#include "vdbgeo/view/image.h"
+#include "vdbgeo/view/drawing.h"
+#include "vdbgeo/view/theme.h"
 #include "vdbgeo/volume/density_map.h"
 #include "vdbgeo/volume/power_spectrum.h"
 
@@ -26,6 +27,8 @@ class Preview {
     void add(const std::string& name, const DensityMap& map, Greys greys, const Progress& progress = {});
 
     Image draw() const;
+    /// The radial power spectra of all maps in one plot.
+    Drawing plot_spectra(const Theme& theme, int width = 1000, int height = 640) const;
     /// Draws and writes the PNG.
     void write(const std::string& path) const;
 

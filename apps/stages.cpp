@@ -9,7 +9,6 @@
 #include "converters/nanovdb_file.h"
 #include "vdbgeo/view/colormap.h"
 #include "vdbgeo/view/plot.h"
-#include "vdbgeo/view/png.h"
 #include "vdbgeo/volume/grid_builder.h"
 
 namespace vdbgeo::app {
@@ -119,24 +118,26 @@ void check_mesh_output(const std::string& path) {
         throw UsageError(fmt::format("{}: the ending tells the format: {}", path, mesh_endings_text()));
 }
 
-void write_angle_histogram(const MeshMeasures& measures, const std::string& path) {
+void write_angle_histogram(const MeshMeasures& measures, const std::string& path, const Theme& theme) {
     PlotOptions options;
+    options.theme = theme;
     options.title = "Angles of the triangles";
     options.x_label = "angle (°)";
-    options.y_label = "angles";
-    write_png(
+    options.y_label = "angles a degree";
+    write_drawing(
         plot_histogram({measures.angle_histogram.begin(), measures.angle_histogram.end()}, 0, 180, options),
         path);
 }
 
 void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasures>>& meshes,
-                            const std::string& path) {
-    if (meshes.size() == 1) return write_angle_histogram(meshes[0].second, path);
+                            const std::string& path, const Theme& theme) {
+    if (meshes.size() == 1) return write_angle_histogram(meshes[0].second, path, theme);
     const Colormap colours("categorical");
     PlotOptions options;
+    options.theme = theme;
     options.title = "Angles of the triangles";
     options.x_label = "angle (°)";
-    options.y_label = "part of the angles, % a degree";
+    options.y_label = "share of the angles (% a degree)";
     std::vector<Curve> curves;
     for (const auto& [name, m] : meshes) {
         Curve curve{name, {}, {}, colours.category(static_cast<std::int64_t>(curves.size()))};
@@ -147,18 +148,22 @@ void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasure
         }
         curves.push_back(std::move(curve));
     }
-    write_png(plot_curves(curves, false, options), path);
+    write_drawing(plot_curves(curves, false, options), path);
 }
 
-void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path) {
+void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path,
+                    const std::optional<MarkedLevel>& level, const Theme& theme) {
     if (rows.empty()) throw NumericalError("no isovalue gives a surface: there is nothing to draw");
     const Colormap colours("categorical");
     std::vector<Curve> curves{{"volume (Å³)", {}, {}, colours.category(0)},
                               {"area (Å²)", {}, {}, colours.category(1)},
                               {"pieces", {}, {}, colours.category(2)}};
     PlotOptions options;
-    options.title = "The surface over the isovalue";
+    options.title = "The surface at each isovalue";
     options.x_label = "isovalue (the map's units)";
+    options.y_label = "volume, area, number";
+    options.theme = theme;
+    if (level) options.marks = {{level->isovalue, level->label}};
     options.x_low = rows[0].isovalue;
     for (const IsovalueRow& row : rows) {
         options.x_low = std::min(options.x_low, row.isovalue);
@@ -167,7 +172,7 @@ void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& pat
         curves[1].y.push_back(row.area_A2);
         curves[2].y.push_back(static_cast<double>(row.components));
     }
-    write_png(plot_curves(curves, true, options), path);
+    write_drawing(plot_curves(curves, true, options), path);
 }
 
 bool has_ending(const std::string& name, const std::string& ending) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/plots.h"
 #include "apps/session.h"
 #include "apps/surface_flags.h"
 #include "converters/map_file.h"
@@ -67,13 +68,16 @@ void check_folder_of(const std::string& path);
 /// UsageError unless a mesh can be written under this name.
 void check_mesh_output(const std::string& path);
 
-/// The histogram of the triangles' angles (the paper's Fig 7) as a picture; of several meshes as curves.
-void write_angle_histogram(const MeshMeasures& measures, const std::string& path);
+/// The histogram of the triangles' angles (the paper's Fig 7) as a plot; of several meshes as curves.
+void write_angle_histogram(const MeshMeasures& measures, const std::string& path,
+                           const Theme& theme = Theme::light());
 void write_angle_histograms(const std::vector<std::pair<std::string, MeshMeasures>>& meshes,
-                            const std::string& path);
+                            const std::string& path, const Theme& theme = Theme::light());
 
-/// Volume, area and pieces of a surface over the isovalue, as a picture.
-void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path);
+/// Volume, area and pieces of a surface over the isovalue, as a plot; one isovalue marked, if given.
+void plot_isovalues(const std::vector<IsovalueRow>& rows, const std::string& path,
+                    const std::optional<MarkedLevel>& level = std::nullopt,
+                    const Theme& theme = Theme::light());
 
 bool has_ending(const std::string& name, const std::string& ending);
 

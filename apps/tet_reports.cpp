@@ -6,7 +6,6 @@
 
 #include "vdbgeo/view/colormap.h"
 #include "vdbgeo/view/plot.h"
-#include "vdbgeo/view/png.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -68,16 +67,17 @@ std::vector<std::string> tets_text(const TetQuality& q) {
 }
 
 void write_dihedral_histogram(const std::vector<std::pair<std::string, TetQuality>>& meshes,
-                              const std::string& path) {
+                              const std::string& path, const Theme& theme) {
     PlotOptions options;
+    options.theme = theme;
     options.title = histogram_title;
     options.x_label = "dihedral angle (°)";
     if (meshes.size() == 1) {
         const auto& counts = meshes[0].second.dihedral_histogram;
-        options.y_label = "angles";
-        return write_png(plot_histogram({counts.begin(), counts.end()}, 0, 180, options), path);
+        options.y_label = "angles a degree";
+        return write_drawing(plot_histogram({counts.begin(), counts.end()}, 0, 180, options), path);
     }
-    options.y_label = "part of the angles, % a degree";
+    options.y_label = "share of the angles (% a degree)";
     const Colormap colours("categorical");
     std::vector<Curve> curves;
     for (const auto& [name, q] : meshes) {
@@ -89,7 +89,7 @@ void write_dihedral_histogram(const std::vector<std::pair<std::string, TetQualit
         }
         curves.push_back(std::move(curve));
     }
-    write_png(plot_curves(curves, false, options), path);
+    write_drawing(plot_curves(curves, false, options), path);
 }
 
 }  // namespace vdbgeo::app

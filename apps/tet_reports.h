@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/plots.h"
 #include "apps/session.h"
 #include "vdbgeo/tet/tet_quality.h"
 
@@ -16,8 +17,8 @@ namespace vdbgeo::app {
 Json tets_json(const TetQuality& quality);
 std::vector<std::string> tets_text(const TetQuality& quality);
 
-/// Histogram of the dihedral angles as a picture (.png); of several meshes as curves.
+/// Histogram of the dihedral angles as a plot; of several meshes as curves.
 void write_dihedral_histogram(const std::vector<std::pair<std::string, TetQuality>>& meshes,
-                              const std::string& path);
+                              const std::string& path, const Theme& theme = Theme::light());
 
 }  // namespace vdbgeo::app

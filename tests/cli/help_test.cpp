@@ -20,13 +20,15 @@ struct Promise {
 };
 
 const std::vector<Promise> promises{
-    {"info", {"Voxel size in Å", "--origin TEXT=auto", "x,y,z in Å", "--volume INT=0", "[all]"}},
+    {"info",
+     {"--histogram", "PNG or SVG", "Voxel size in Å", "--origin TEXT=auto", "x,y,z in Å", "--volume INT=0",
+      "[all]"}},
     {"convert", {"Voxel size in Å", "in the map's units", "sigma", "0, 1, 2, 6, 12 or 101", "[blosc]"}},
     {"phantom",
      {"--size INT=128", "Voxel size in Å", "Radius in Å", "Height in Å", "Period in Å", "[no noise]"}},
     {"denoise",
      {"--method TEXT=hyperdiffusion", "voxels^(2q+2)", "in the map's units a voxel", "[auto]", "--memory",
-      "--preview", "[0.9 of it]"}},
+      "--preview", "--spectra", "[0.9 of it]"}},
     {"edges", {"--order INT=0", "--time FLOAT=10", "voxels^(2q+2)", "--preview"}},
     {"transform",
      {"--orders", "--times", "in voxels^(2q+2)", "[inf]", "--keep", "--band-pass", "OUT_mode_1.mrc"}},
@@ -40,7 +42,8 @@ const std::vector<Promise> promises{
     {"repair", {"--max-hole UINT=1000"}},
     {"measure", {".ply .obj .off .stl", "PNG"}},
     {"curvature",
-     {"--method TEXT=auto", "in 1/Å", "in voxels", "in Å", "--degree INT=2", "--area", "NAME=MAP"}},
+     {"--method TEXT=auto", "in 1/Å", "in voxels", "in Å", "--degree INT=2", "--area", "NAME=MAP", "--plane",
+      "--dark"}},
     {"pockets",
      {"in 1/Å", "in Å²", "in Å [", "--list UINT=20", "--protrusions", "--ambient-radius", "--picture"}},
     {"components", {"in Å³", "in Å²", "--list UINT=20"}},
@@ -135,12 +138,17 @@ TEST_F(Help, ExamplesRun) {
             EXPECT_EQ(r.code, 0) << joined(words) << "\n" << r.err;
         }
     }
-    for (const char* made :
-         {"emd_1080.vdb",     "smooth.mrc",        "smooth.png", "median.mrc",        "edges.mrc",
-          "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",   "flowed.mrc",        "smooth.vdb",
-          "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
-          "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
-          "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
-          "pockets.png",      "tips.json",         "inside.png", "half.ply",          "peeled.png"})
+    for (const char* made : {"emd_1080.vdb",      "smooth.mrc",        "smooth.png",
+                             "median.mrc",        "edges.mrc",         "groel_mode_3.mrc",
+                             "groel_residue.mrc", "band.mrc",          "flowed.mrc",
+                             "smooth.vdb",        "atpase.mrc",        "clean.mrc",
+                             "groel.png",         "groel/surface.ply", "good.ply",
+                             "even.ply",          "curved.ply",        "small.ply",
+                             "near.ply",          "smooth.ply",        "round.ply",
+                             "sound.ply",         "clean.ply",         "levels.png",
+                             "density.svg",       "spectra.svg",       "k.svg",
+                             "k1k2.svg",          "pockets.csv",       "pockets.png",
+                             "tips.json",         "inside.png",        "half.ply",
+                             "peeled.png"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

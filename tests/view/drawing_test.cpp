@@ -225,7 +225,7 @@ TEST(Ticks, RoundDownGivesOneTwoFive) {
 
 TEST(Plot, BarsHaveTheHeightsOfTheirCounts) {
     const PlotOptions options;
-    const Image image = plot_histogram({1, 4, 2}, 0, 3, options);
+    const Image image = rasterise(plot_histogram({1, 4, 2}, 0, 3, options));
     const auto bar_pixels = [&](int part) {
         std::size_t n = 0;
         const Vec3f& c = options.bars;
@@ -264,7 +264,7 @@ TEST(Plot, APowerOfTenIsAStraightCurveOnALogarithmicAxis) {
         curve.y.push_back(std::pow(10.0, -0.1 * i));
     }
     curve.name.clear();  // the legend has its colour too
-    const Image image = plot_curves({curve}, true);
+    const Image image = rasterise(plot_curves({curve}, true));
     std::vector<Vec2d> middles;
     for (int x = 0; x < image.width; ++x) {
         double sum = 0, n = 0;
@@ -286,7 +286,7 @@ TEST(Plot, APowerOfTenIsAStraightCurveOnALogarithmicAxis) {
 }
 
 TEST(Plot, CurvesWithoutValuesGiveEmptyAxesAndBadOnesAreErrors) {
-    const Image axes = plot_curves({}, true);
+    const Drawing axes = plot_curves({}, true);
     EXPECT_EQ(plot_curves({{"", {1, 2}, {0, std::nan("")}, {1, 0, 0}}}, true).width, axes.width);
     EXPECT_NO_THROW(plot_curves({{"", {1, 2}, {-1, 1}, {1, 0, 0}}}, false));
     EXPECT_NO_THROW(plot_curves({{"", {0, 0}, {1, 1}, {1, 0, 0}}}, true));

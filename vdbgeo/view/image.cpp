@@ -57,14 +57,15 @@ void blend(Image& image, int x, int y, const Vec3f& colour, double cover) {
     for (int k = 0; k < 3; ++k) pixel[k] = to_byte(pixel[k] / 255.0f * (1 - c) + colour[k] * c);
 }
 
-void fill_rectangle(Image& image, double x0, double y0, double x1, double y1, const Vec3f& colour) {
+void fill_rectangle(Image& image, double x0, double y0, double x1, double y1, const Vec3f& colour,
+                    double opacity) {
     const auto [left, right] = touched(x0, x1, image.width);
     const auto [top, bottom] = touched(y0, y1, image.height);
     for (int y = top; y < bottom; ++y)
         for (int x = left; x < right; ++x) {
             const double wide = std::min(x1, x + 1.0) - std::max(x0, double(x));
             const double high = std::min(y1, y + 1.0) - std::max(y0, double(y));
-            blend(image, x, y, colour, std::max(wide, 0.0) * std::max(high, 0.0));
+            blend(image, x, y, colour, std::max(wide, 0.0) * std::max(high, 0.0) * opacity);
         }
 }
 

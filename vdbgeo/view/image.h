@@ -43,8 +43,9 @@ void paste(Image& image, const Image& piece, int x, int y);
 /// Mixes `colour` into one pixel: cover 0 leaves it, 1 replaces it. Pixels outside the image are ignored.
 void blend(Image& image, int x, int y, const Vec3f& colour, double cover);
 
-/// Fills [x0, x1] × [y0, y1]; fractional edges cover their pixels in part.
-void fill_rectangle(Image& image, double x0, double y0, double x1, double y1, const Vec3f& colour);
+/// Fills [x0, x1] × [y0, y1]; fractional edges cover their pixels in part. Opacity 0 leaves what is there.
+void fill_rectangle(Image& image, double x0, double y0, double x1, double y1, const Vec3f& colour,
+                    double opacity = 1);
 
 /// A line with round ends.
 struct Segment {

@@ -8,6 +8,7 @@
 #include "apps/flow_flags.h"
 #include "apps/map_filter.h"
 #include "apps/preview.h"
+#include "apps/render_slices.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "vdbgeo/flow/baselines.h"
@@ -21,6 +22,7 @@ struct DenoiseOptions {
     MapFilterFlags files;
     DiffusionFlags diffusion;
     std::string method = "hyperdiffusion";
+    std::string slices;  ///< beginning of the names of bare sections before and after
     double blur = BilateralOptions().sigma;
     std::optional<double> range;
     int radius = 1;
@@ -49,6 +51,7 @@ void DenoiseOptions::finish(Session& session) {
     files.finish();
     check_flags();
     check_map_output(files.out, session);
+    check_folder_of(slices);
     if (method == "bilateral") check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
         if (!diffusion.orders.empty())
@@ -154,7 +157,9 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
     Preview preview;
+    SlicePairs slices;
     const bool shown = !o.files.preview.empty();
+    if (!o.slices.empty()) slices.take_before(in.map);
     if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
     const double rms_before = active_moments(*in.map.grid).statistics().rms;
     seconds["preview"] = clock.lap();
@@ -169,6 +174,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     j["removed"] = outcome.removed;
     j.update(statistics_json(in.map.statistics));
     if (shown) preview.add("after", in.map, Preview::Greys::as_first, session.stage("preview"));
+    if (!o.slices.empty()) slices.take_after(in.map);
     seconds["preview"] = seconds["preview"].get<double>() + clock.lap();
     write_filtered(o.files, in.map, j, session);
     seconds["write"] = clock.lap();
@@ -178,6 +184,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     } else {
         seconds.erase("preview");
     }
+    if (!o.slices.empty()) j["slices"] = slices.write(o.slices);
     j["seconds"] = seconds;
     say_outcome(outcome, j, rms_before, session);
     if (j["automatic"] == true && outcome.removed == 0)
@@ -218,6 +225,9 @@ Command denoise_command() {
             o->files.add(app,
                          "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
             o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
+            app.add_option("--slices", o->slices,
+                           "Write the middle sections, bare and in the same greys, before and after: "
+                           "SLICES_before_x.png, SLICES_after_x.png, and y, z [none]");
             return [o](Session& session) {
                 o->finish(session);
                 run_denoise(*o, session);

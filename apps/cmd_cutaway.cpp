@@ -7,12 +7,12 @@
 #include <limits>
 
 #include "apps/command.h"
+#include "apps/cutaway_picture.h"
 #include "apps/flags.h"
 #include "apps/stages.h"
 #include "apps/tet_reports.h"
 #include "converters/mesh_file.h"
 #include "converters/tet_file.h"
-#include "vdbgeo/tet/cutaway.h"
 #include "vdbgeo/tet/tet_quality.h"
 #include "vdbgeo/view/png.h"
 
@@ -54,13 +54,8 @@ std::vector<double> numbers_of(const std::string& flag, const std::string& text,
 /// The axes' planes take away what is before them in the views side, front and top.
 void parse_plane(CutawayCommandOptions& o) {
     const std::string expected = "x, y, z, a normal NX,NY,NZ, or NX,NY,NZ,D with D in Å";
-    if (o.plane == "x") {
-        o.normal = Vec3d::UnitX();
-    } else if (o.plane == "y") {
-        o.normal = -Vec3d::UnitY();
-    } else if (o.plane == "z") {
-        o.normal = Vec3d::UnitZ();
-    } else {
+    o.normal = normal_across(o.plane);
+    if (o.normal.isZero()) {
         const std::vector<double> n = numbers_of("--plane", o.plane, expected);
         if (n.size() != 3 && n.size() != 4)
             throw UsageError(fmt::format("--plane: '{}' is not {}", o.plane, expected));
@@ -102,80 +97,30 @@ void finish(CutawayCommandOptions& o, const CLI::App& flags) {
 
 /// The plane or peel in numbers; a plane's place along its normal is told as a part of the mesh's extent.
 CutawayOptions cutaway_options(const CutawayCommandOptions& o, const TetMesh& mesh) {
-    Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    double first = low.x(), last = high.x();
-    for (const Tetrahedron& t : mesh.tets)
-        for (const VertexId v : t) {
-            const Vec3d& p = mesh.points[v];
-            low = low.cwiseMin(p), high = high.cwiseMax(p);
-            const double along = o.normal.dot(p);
-            first = std::min(first, along), last = std::max(last, along);
-        }
     CutawayOptions options;
     if (o.peel) {
+        Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+        for (const Tetrahedron& t : mesh.tets)
+            for (const VertexId v : t) {
+                low = low.cwiseMin(mesh.points[v]), high = high.cwiseMax(mesh.points[v]);
+            }
         // From before the mesh, as the view "front" has it.
         const Vec3d front((low.x() + high.x()) / 2, low.y() - (high - low).norm(), (low.z() + high.z()) / 2);
         options.peel = CutawayOptions::Peel{*o.peel, o.seed_face, o.from_A.value_or(front)};
-        return options;
+    } else if (o.offset_A) {
+        options.plane = CutawayOptions::Plane{*o.offset_A * o.normal, o.normal, !o.clip};
+    } else {
+        options.plane = plane_at(mesh, o.normal, o.at, !o.clip);
     }
-    const double place = o.offset_A ? *o.offset_A : first + o.at * (last - first);
-    options.plane = CutawayOptions::Plane{place * o.normal, o.normal, !o.clip};
     return options;
 }
 
-/// Towards a viewer who looks into the opening, a little from the right and from above, as an option of
-/// render; "iso" where nothing is open.
-std::string view_onto(const TriMesh& mesh) {
-    const MeshProperty* interior = mesh.find_face_property(interior_property);
-    Vec3d opening = Vec3d::Zero();
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
-        if (!(interior->values[f] > 0)) continue;
-        const Triangle& t = mesh.triangles[f];
-        const Vec3d a = mesh.points[t[0]].cast<double>();
-        opening += (mesh.points[t[1]].cast<double>() - a).cross(mesh.points[t[2]].cast<double>() - a);
-    }
-    if (!(opening.norm() > 0)) return "iso";
-    opening.normalize();
-    const Vec3d up = opening.head<2>().norm() > 0.1 ? Vec3d::UnitZ() : Vec3d::UnitY();
-    const Vec3d right = up.cross(opening).normalized();
-    const Vec3d v = (opening + 0.35 * right + 0.3 * opening.cross(right)).normalized();
-    return fmt::format("{:.2f},{:.2f},{:.2f}", v.x(), v.y(), v.z());
-}
-
-/// Colour scales that are the same from picture to picture: angles to that of the regular tetrahedron.
-void set_colours(RenderOptions& render, const std::string& property) {
-    const auto range = [&](double low, double high) {
-        if (!render.range_min) render.range_min = low;
-        if (!render.range_max) render.range_max = high;
-    };
-    render.property = property;
-    if (property == "min_dihedral_deg") {
-        range(0, 70);
-        render.label = "smallest dihedral angle (°)";
-    } else if (property == "radius_edge") {
-        range(0.6, 2);
-        render.label = "radius-edge ratio";
-    } else if (property == "volume_A3") {
-        render.label = "volume (Å³)";
-    } else {
-        render.colormap = "categorical";
-    }
-}
-
-/// The picture: faces that were cut open have colours by the property, the old boundary has none.
-Image draw(const CutawayCommandOptions& o, TriMesh mesh, const Progress& progress) {
+Image draw(const CutawayCommandOptions& o, const TriMesh& mesh, const Progress& progress) {
     RenderOptions render = o.render;
     if (!o.own_view) render.view = view_onto(mesh);
     render.edges = !o.no_edges;
-    set_colours(render, o.property);
-    const std::vector<float> interior = mesh.find_face_property(interior_property)->values;
-    mesh.vertex_properties.clear();
-    // Regions tell something of the old boundary too.
-    for (MeshProperty& p : mesh.face_properties)
-        if (p.name == o.property && p.name != "region")
-            for (std::size_t f = 0; f < interior.size(); ++f)
-                if (!(interior[f] > 0)) p.values[f] = std::numeric_limits<float>::quiet_NaN();
-    return vdbgeo::render(mesh, render, progress);
+    set_cut_colours(render, o.property);
+    return vdbgeo::render(shown_cut(mesh, o.property), render, progress);
 }
 
 void run_cutaway(const CutawayCommandOptions& o, Session& session) {

@@ -9,6 +9,7 @@
 #include "apps/map_filter.h"
 #include "apps/plots.h"
 #include "apps/preview.h"
+#include "apps/render_slices.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "vdbgeo/flow/baselines.h"
@@ -22,6 +23,7 @@ struct DenoiseOptions {
     MapFilterFlags files;
     DiffusionFlags diffusion;
     std::string method = "hyperdiffusion", spectra;
+    std::string slices;  ///< beginning of the names of bare sections before and after
     PlotFlags plots;
     double blur = BilateralOptions().sigma;
     std::optional<double> range;
@@ -53,6 +55,7 @@ void DenoiseOptions::finish(Session& session) {
     check_map_output(files.out, session);
     check_plot_output(spectra);
     plots.check(!spectra.empty(), "--spectra");
+    check_folder_of(slices);
     if (method == "bilateral") check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
         if (!diffusion.orders.empty())
@@ -158,7 +161,9 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
     Preview preview;
+    SlicePairs slices;
     const bool shown = !o.files.preview.empty() || !o.spectra.empty();
+    if (!o.slices.empty()) slices.take_before(in.map);
     if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
     const double rms_before = active_moments(*in.map.grid).statistics().rms;
     seconds["preview"] = clock.lap();
@@ -173,6 +178,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     j["removed"] = outcome.removed;
     j.update(statistics_json(in.map.statistics));
     if (shown) preview.add("after", in.map, Preview::Greys::as_first, session.stage("preview"));
+    if (!o.slices.empty()) slices.take_after(in.map);
     seconds["preview"] = seconds["preview"].get<double>() + clock.lap();
     write_filtered(o.files, in.map, j, session);
     seconds["write"] = clock.lap();
@@ -188,6 +194,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     } else {
         seconds.erase("preview");
     }
+    if (!o.slices.empty()) j["slices"] = slices.write(o.slices);
     j["seconds"] = seconds;
     say_outcome(outcome, j, rms_before, session);
     if (j["automatic"] == true && outcome.removed == 0)
@@ -231,6 +238,9 @@ Command denoise_command() {
             app.add_option("--spectra", o->spectra,
                            "Plot the radial power spectra before and after here (PNG or SVG)");
             o->plots.add(app);
+            app.add_option("--slices", o->slices,
+                           "Write the middle sections, bare and in the same greys, before and after: "
+                           "SLICES_before_x.png, SLICES_after_x.png, and y, z [none]");
             return [o](Session& session) {
                 o->finish(session);
                 run_denoise(*o, session);

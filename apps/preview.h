@@ -7,6 +7,7 @@
 
 #include "vdbgeo/core/progress.h"
 #include "vdbgeo/view/drawing.h"
+#include "vdbgeo/view/sections.h"
 #include "vdbgeo/view/theme.h"
 #include "vdbgeo/volume/density_map.h"
 #include "vdbgeo/volume/power_spectrum.h"
@@ -24,7 +25,7 @@ class Preview {
     };
 
     /// Takes the sections and the spectrum of a map.
-    void add(const std::string& name, const DensityMap& map, Greys greys, const Progress& progress = {});
+    void add(const std::string& name, const DensityMap& map, Greys scale, const Progress& progress = {});
 
     Image draw() const;
     /// The radial power spectra of all maps in one plot.
@@ -33,24 +34,13 @@ class Preview {
     void write(const std::string& path) const;
 
  private:
-    /// Samples of a section, rows from bottom to top.
-    struct Section {
-        std::string title;
-        int width = 0, height = 0;
-        double step_x = 1, step_y = 1;  ///< Å
-        std::vector<float> values;
-    };
     struct Row {
         std::string name;
         std::array<Section, 3> sections;
-        double black = 0, white = 1;
+        vdbgeo::Greys greys;
         PowerSpectrum spectrum;
     };
 
-    static Section take_section(const DensityMap& map, int across);
-    static void set_greys(Row& row);
-    static void draw_section(Image& image, const Row& row, const Section& section, int left, int top,
-                             int width, int height);
     Image draw_spectra(int width) const;
 
     std::vector<Row> rows_;

@@ -1,19 +1,17 @@
 #include "vdbgeo/view/render.h"
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cmath>
-#include <limits>
+#include <memory>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/hidden_edges.h"
-#include "vdbgeo/core/parallel.h"
 #include "vdbgeo/view/layout.h"
 #include "vdbgeo/view/ray_caster.h"
+#include "vdbgeo/view/shading.h"
+#include "vdbgeo/view/view_model.h"
 
 namespace vdbgeo {
 
@@ -32,6 +30,10 @@ void RenderOptions::check() const {
     side("width", width);
     if (height) side("height", *height);
     find_views(view);
+    need(zoom >= 0.1 && zoom <= 100, fmt::format("zoom {} is not in 0.1 to 100", zoom));
+    need(!focus || focus->allFinite(), "the focus is not a place of finite coordinates");
+    need(!columns || (*columns >= 1 && *columns <= 100),
+         fmt::format("columns: {} is not in 1 to 100", columns.value_or(0)));
     if (colormap) Colormap{*colormap};
     need(samples == 1 || samples == 4 || samples == 9 || samples == 16,
          fmt::format("samples a pixel: {} is not 1, 4, 9 or 16", samples));
@@ -41,6 +43,8 @@ void RenderOptions::check() const {
     need(!range_max || std::isfinite(*range_max), "the colour range's maximum is not a finite number");
     need(!range_min || !range_max || *range_min < *range_max,
          fmt::format("the colour range {} to {} is empty", range_min.value_or(0), range_max.value_or(0)));
+    need(!lines_only || outline || edges, "a drawing of lines without outlines and edges is empty");
+    need(!lines_only || !property, "a drawing of lines has no colours of a property");
     colour("surface", surface);
     colour("inside", inside);
     colour("background", background);
@@ -50,7 +54,8 @@ void RenderOptions::check() const {
 
 bool can_render() { return false; }
 
-Image render(const TriMesh&, const RenderOptions& options, const Progress&) {
+void render_turntable(const std::vector<RenderItem>&, int, const RenderOptions& options,
+                      const std::function<void(int, const Image&)>&, const Progress&) {
     options.check();
     throw InvalidInput("this build has no ray caster (embree): pictures of surfaces cannot be made");
 }
@@ -58,418 +63,6 @@ Image render(const TriMesh&, const RenderOptions& options, const Progress&) {
 #else
 
 namespace {
-
-using Vec3fs = Array<Vec3f>;
-
-Vec3f linear(const Vec3f& srgb) { return srgb.unaryExpr(&srgb_to_linear); }
-
-/// The mesh moved into the unit ball about the origin, with vertex normals.
-struct Model {
-    Vec3d centre;
-    double radius = 0;  // Å a unit
-    Vec3fs points, normals;
-    const Array<Triangle>* triangles = nullptr;
-};
-
-/// Sums of the facets' normals e × f / (|e|² |f|²) over the corners with edges e and f (Max 1999), which is
-/// exact on a sphere and lets the skinny triangles of marching cubes have their say: by area the large ones
-/// beside them win, and the faces show. A point without area round it keeps zero.
-Vec3fs vertex_normals(const Model& model) {
-    constexpr double floor = 1e-10;  // edges under 1e-5 radii are too short for single precision
-    std::vector<Vec3d> sums(model.points.size(), Vec3d::Zero());
-    for (const Triangle& t : *model.triangles) {
-        const Vec3d a = model.points[t[0]].cast<double>(), ab = model.points[t[1]].cast<double>() - a,
-                    ac = model.points[t[2]].cast<double>() - a;
-        const Vec3d cross = ab.cross(ac);
-        const double c2 = ab.squaredNorm() + floor, b2 = ac.squaredNorm() + floor,
-                     a2 = (ac - ab).squaredNorm() + floor;
-        sums[t[0]] += cross / (b2 * c2);
-        sums[t[1]] += cross / (a2 * c2);
-        sums[t[2]] += cross / (a2 * b2);
-    }
-    Vec3fs normals(sums.size());
-    parallel_for(sums.size(), 4096,
-                 [&](std::size_t i) { normals[i] = sums[i].stableNormalized().cast<float>(); });
-    return normals;
-}
-
-Model make_model(const TriMesh& mesh) {
-    Model model;
-    Vec3d low = Vec3d::Constant(1e300), high = -low;
-    for (const Triangle& t : mesh.triangles)
-        for (const VertexId v : t) {
-            low = low.cwiseMin(mesh.points[v].cast<double>());
-            high = high.cwiseMax(mesh.points[v].cast<double>());
-        }
-    model.centre = (low + high) / 2;
-    model.radius = (high - low).norm() / 2;
-    if (!(model.radius > 0)) throw InvalidInput("the mesh has no extent: all its points coincide");
-    model.triangles = &mesh.triangles;
-    model.points.resize(mesh.points.size());
-    parallel_for(mesh.points.size(), 4096, [&](std::size_t i) {
-        model.points[i] = ((mesh.points[i].cast<double>() - model.centre) / model.radius).cast<float>();
-    });
-    model.normals = vertex_normals(model);
-    return model;
-}
-
-ViewBox box_in_view(const Model& model, const View& view) {
-    Mat3d axes;
-    axes << view.right, view.up, view.towards;
-    const ViewBox nothing{Vec3d::Constant(1e300), Vec3d::Constant(-1e300)};
-    const auto& triangles = *model.triangles;
-    return fixed_order_reduce(
-        triangles.size(), 4096, nothing,
-        [&](std::size_t begin, std::size_t end) {
-            ViewBox box = nothing;
-            for (std::size_t f = begin; f < end; ++f)
-                for (const VertexId v : triangles[f]) {
-                    const Vec3d p = axes.transpose() * model.points[v].cast<double>() * model.radius;
-                    box.low = box.low.cwiseMin(p);
-                    box.high = box.high.cwiseMax(p);
-                }
-            return box;
-        },
-        [](ViewBox& all, const ViewBox& part) {
-            all.low = all.low.cwiseMin(part.low);
-            all.high = all.high.cwiseMax(part.high);
-        });
-}
-
-/// What one primary ray found. Directions are in camera axes: right, up, towards the viewer.
-struct Sample {
-    bool hit = false, inside = false;
-    float depth = 0;     // along `towards`, model units
-    float open = 1;      // share of the hemisphere that is free
-    float lit = 1;       // share of the key light that arrives
-    Vec3f normal, base;  // base: linear light
-};
-
-/// The lights, in camera axes.
-const Vec3f key_light = Vec3f(-0.54f, 0.62f, 0.57f).normalized();
-const Vec3f fill_light = Vec3f(0.75f, -0.15f, 0.64f).normalized();
-constexpr float occlusion_reach = 0.5f;  // of the mesh's radius
-constexpr int shadow_rays = 2;           // a sample
-constexpr float light_radius = 0.2f;     // of the key light's disc, at distance 1
-constexpr float ray_offset = 2e-5f;      // of the mesh's radius: some 100 units in the last place
-
-/// Three well mixed numbers in [0, 1) from four integers.
-std::array<float, 3> noise(std::uint32_t x, std::uint32_t y, std::uint32_t i, std::uint32_t stream) {
-    std::uint64_t h = (std::uint64_t(x) << 32 | y) * 0x9E3779B97F4A7C15ull;
-    h ^= (std::uint64_t(i) << 32 | stream) * 0xC2B2AE3D27D4EB4Full + (h >> 29);
-    h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
-    h = (h ^ (h >> 32)) * 0xD6E8FEB86659FD93ull;
-    h ^= h >> 32;
-    const auto part = [&](int shift) { return static_cast<float>(h >> shift & 0x1FFFFF) * 0x1p-21f; };
-    return {part(0), part(21), part(42)};
-}
-
-/// Two unit vectors that make a right-handed frame with the unit vector n.
-std::pair<Vec3f, Vec3f> tangents(const Vec3f& n) {
-    const Vec3f helper = std::abs(n.z()) < 0.9f ? Vec3f::UnitZ() : Vec3f::UnitX();
-    const Vec3f t = helper.cross(n).normalized();
-    return {t, n.cross(t)};
-}
-
-/// Everything that the pixels of a picture share.
-struct Scene {
-    const Model& model;
-    const RayCaster& rays;
-    const RenderOptions& options;
-    const MeshProperty* property;
-    bool of_faces;  // the property
-    const std::optional<ColourScale>& scale;
-    const MeshProperty* hidden_edges;
-    int grid;  // samples along a pixel's side
-};
-
-/// A panel's camera: model = axes · (right, up, towards).
-struct Camera {
-    Eigen::Matrix3f axes;
-    float left, top, step;  // corner of sample (0, 0) and the distance of samples, model units
-    float near, far;        // depths of the model
-};
-
-Vec3f base_colour(const Scene& scene, const RayCaster::Hit& hit, const Triangle& t, bool inside) {
-    const Vec3f plain = linear(inside ? scene.options.inside : scene.options.surface);
-    if (!scene.property) return plain;
-    const auto& values = scene.property->values;
-    const float w = 1 - hit.u - hit.v;
-    double value = 0;
-    if (scene.of_faces) {
-        value = values[hit.face];
-        if (std::isnan(value)) return plain;
-    } else if (scene.scale->map.categories() > 0) {
-        value = values[w >= hit.u && w >= hit.v ? t[0] : hit.u >= hit.v ? t[1] : t[2]];
-    } else {
-        value = w * values[t[0]] + hit.u * values[t[1]] + hit.v * values[t[2]];
-    }
-    return linear(scene.scale->colour(value)) * (inside ? 0.35f : 1.0f);
-}
-
-/// How much of the light an edge of the face takes at a point of it: lines about a pixel wide, by the
-/// distance to the edges in the picture. Faces of a few pixels and those seen edge-on have fainter lines:
-/// they would be nothing else.
-float edge_ink(const Scene& scene, const Camera& camera, const RayCaster::Hit& hit, const Triangle& t) {
-    constexpr float most = 0.8f, half_width = 0.5f;  // pixels
-    const float pixel = camera.step * static_cast<float>(scene.grid);
-    std::array<Eigen::Vector2f, 3> p;
-    for (std::size_t k = 0; k < 3; ++k)
-        p[k] = (camera.axes.transpose() * scene.model.points[t[k]]).head<2>() / pixel;
-    const Eigen::Vector2f ab = p[1] - p[0], ac = p[2] - p[0];
-    const float area = std::abs(ab.x() * ac.y() - ab.y() * ac.x());  // twice, pixels²
-    const std::array<float, 3> length{(p[2] - p[1]).norm(), ac.norm(), ab.norm()};
-    const float around = length[0] + length[1] + length[2];
-    if (!(area > 0)) return 0;
-    const float inner_radius = area / around;
-    const float strength = most * std::clamp((inner_radius - 0.5f) / 3.0f, 0.0f, 1.0f);
-    const unsigned hidden =
-        scene.hidden_edges ? static_cast<unsigned>(scene.hidden_edges->values[hit.face]) : 0;
-    const std::array<float, 3> weight{1 - hit.u - hit.v, hit.u, hit.v};
-    float nearest = std::numeric_limits<float>::infinity();
-    for (unsigned k = 0; k < 3; ++k)
-        if (!(hidden >> k & 1u)) nearest = std::min(nearest, weight[k] * area / length[k]);
-    return strength * std::clamp(half_width + 0.5f - nearest, 0.0f, 1.0f);
-}
-
-/// Rays from one point, cast when a packet is full. Each adds 1 to a counter where nothing blocks it.
-class Fan {
- public:
-    Fan(const RayCaster& rays, const Vec3f& origin) : rays_(rays), origin_(origin) {}
-    void add(const Vec3f& direction, float length, int& free) {
-        directions_[count_] = direction;
-        lengths_[count_] = length;
-        counters_[count_] = &free;
-        if (++count_ == RayCaster::packet) cast();
-    }
-    void cast() {
-        if (count_ == 0) return;
-        const auto blocked = rays_.blocked(origin_, directions_, lengths_, count_);
-        for (int i = 0; i < count_; ++i) *counters_[i] += !blocked[static_cast<std::size_t>(i)];
-        count_ = 0;
-    }
-
- private:
-    const RayCaster& rays_;
-    Vec3f origin_;
-    Vec3f directions_[RayCaster::packet];
-    float lengths_[RayCaster::packet];
-    int* counters_[RayCaster::packet];
-    int count_ = 0;
-};
-
-/// Neighbouring samples take interleaved parts of one pattern of directions, so that averaging over 4×4 of
-/// them sees sixteen times as many evenly spread ones. Coordinates of ray i of n in the unit disc, evenly by
-/// area, and a free number.
-struct DiscRay {
-    float square, angle, extra;  // radius², radians, [0, 1)
-};
-DiscRay disc_ray(std::uint32_t x, std::uint32_t y, int i, int n, std::uint32_t stream) {
-    static constexpr std::uint32_t order[16] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
-    const float turn = static_cast<float>(order[(y & 3) * 4 + (x & 3)]);
-    const float shift = static_cast<float>(order[((x + 1) & 3) * 4 + ((y + 2) & 3)]);
-    const auto [a, b, c] = noise(x, y, static_cast<std::uint32_t>(i), stream);
-    const float k = static_cast<float>(i);
-    return {(k + (shift + a) / 16) / static_cast<float>(n), 6.2831853f * (k * 0.61803399f + (turn + b) / 16),
-            c};
-}
-
-/// Casts the rays of ambient occlusion (cosine-weighted) and of the key light's shadow from `origin`, in the
-/// hemisphere of the smooth normal: that of the flat face would cut the light off along the faces' edges.
-void light_sample(const Scene& scene, const Camera& camera, const Vec3f& origin, std::uint32_t x,
-                  std::uint32_t y, Sample& sample) {
-    Fan fan(scene.rays, origin);
-    int open = 0, lit = 0;
-    const auto [tangent, bitangent] = tangents(sample.normal);
-    const int n = scene.options.occlusion_rays;
-    for (int i = 0; i < n; ++i) {
-        const DiscRay ray = disc_ray(x, y, i, n, 0);
-        const float flat = std::sqrt(ray.square);
-        const Vec3f d = flat * std::cos(ray.angle) * tangent + flat * std::sin(ray.angle) * bitangent +
-                        std::sqrt(std::max(0.0f, 1 - ray.square)) * sample.normal;
-        fan.add(camera.axes * d, occlusion_reach * (0.05f + 0.95f * ray.extra), open);
-    }
-    const auto [across, up] = tangents(key_light);
-    for (int i = 0; scene.options.shadows && i < shadow_rays; ++i) {
-        const DiscRay ray = disc_ray(x, y, i, shadow_rays, 1);
-        const float flat = light_radius * std::sqrt(ray.square);
-        const Vec3f d =
-            (key_light + flat * (std::cos(ray.angle) * across + std::sin(ray.angle) * up)).normalized();
-        if (d.dot(sample.normal) > 0) fan.add(camera.axes * d, 4.0f, lit);
-    }
-    fan.cast();
-    if (n > 0) sample.open = static_cast<float>(open) / static_cast<float>(n);
-    if (scene.options.shadows) sample.lit = static_cast<float>(lit) / shadow_rays;
-}
-
-/// The point of a face moved out to where the smooth normals imagine the surface (Hanika 2021): rays that
-/// start there are not cut off by the face itself or its neighbours where the mesh is a coarse image of a
-/// convex surface. Where the surface is concave or flat the point stays.
-Vec3f lifted(const Model& model, const Triangle& t, const float* weights, const Vec3f& point, bool inside) {
-    Vec3f result = point;
-    for (int k = 0; k < 3; ++k) {
-        const Vec3f normal = inside ? Vec3f(-model.normals[t[k]]) : model.normals[t[k]];
-        result -= weights[k] * std::min(0.0f, (point - model.points[t[k]]).dot(normal)) * normal;
-    }
-    return result;
-}
-
-Sample trace(const Scene& scene, const Camera& camera, int column, int row) {
-    Sample sample;
-    const float x = camera.left + (static_cast<float>(column) + 0.5f) * camera.step;
-    const float y = camera.top - (static_cast<float>(row) + 0.5f) * camera.step;
-    const Vec3f towards = camera.axes.col(2);
-    const Vec3f eye = camera.axes * Vec3f(x, y, 2.0f);
-    const auto hit = scene.rays.first(eye, -towards);
-    if (!hit) return sample;
-    const Triangle& t = (*scene.model.triangles)[hit->face];
-    const auto& p = scene.model.points;
-    const auto& n = scene.model.normals;
-    const Vec3f face = camera.axes.transpose() * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
-    const float w = 1 - hit->u - hit->v;
-    sample.hit = true;
-    sample.inside = face.z() < 0;
-    const Vec3f face_normal = face.normalized() * (sample.inside ? -1.0f : 1.0f);
-    Vec3f normal = camera.axes.transpose() * (w * n[t[0]] + hit->u * n[t[1]] + hit->v * n[t[2]]);
-    if (sample.inside) normal = -normal;
-    // A smooth normal that looks away from the viewer is turned to the horizon.
-    normal.z() = std::max(normal.z(), 0.0f);
-    sample.normal = normal.norm() > 1e-6f ? Vec3f(normal.normalized()) : face_normal;
-    sample.base = base_colour(scene, *hit, t, sample.inside);
-    if (scene.options.edges) sample.base *= 1 - edge_ink(scene, camera, *hit, t);
-    const float weights[3] = {w, hit->u, hit->v};
-    const Vec3f point = w * p[t[0]] + hit->u * p[t[1]] + hit->v * p[t[2]];
-    sample.depth = point.dot(towards);
-    const Vec3f origin =
-        lifted(scene.model, t, weights, point, sample.inside) + camera.axes * (ray_offset * face_normal);
-    light_sample(scene, camera, origin, static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row),
-                 sample);
-    return sample;
-}
-
-/// The samples of a tile and of a border around it.
-struct Tile {
-    int columns, rows;
-    std::vector<Sample> samples;
-    const Sample& at(int x, int y) const {
-        return samples[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
-                       static_cast<std::size_t>(x)];
-    }
-};
-
-/// Weights of the neighbours within `reach`, row by row.
-std::vector<float> bell(int reach) {
-    std::vector<float> weights;
-    for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx)
-            weights.push_back(
-                std::exp(-1.2f * static_cast<float>(dx * dx + dy * dy) / static_cast<float>(reach * reach)));
-    return weights;
-}
-
-/// Occlusion and light averaged over the neighbours that lie on the same piece of surface.
-std::pair<float, float> smooth_light(const Tile& tile, int x, int y, int reach, const float* bell,
-                                     float step) {
-    const Sample& here = tile.at(x, y);
-    float weight = 0, open = 0, lit = 0;
-    for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx, ++bell) {
-            const Sample& other = tile.at(x + dx, y + dy);
-            if (!other.hit || other.inside != here.inside) continue;
-            const float like = here.normal.dot(other.normal);
-            if (like < 0.7f) continue;
-            const Vec3f apart(static_cast<float>(dx) * step, static_cast<float>(-dy) * step,
-                              other.depth - here.depth);
-            if (std::abs(apart.dot(here.normal)) > 2 * step * static_cast<float>(reach)) continue;
-            const float w = like * like * *bell;
-            weight += w;
-            open += w * other.open;
-            lit += w * other.lit;
-        }
-    return weight > 0 ? std::pair(open / weight, lit / weight) : std::pair(here.open, here.lit);
-}
-
-/// Whether the surface ends here before something clearly farther.
-bool on_outline(const Tile& tile, int x, int y, int reach) {
-    const Sample& here = tile.at(x, y);
-    for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx) {
-            const Sample& other = tile.at(x + dx, y + dy);
-            if (!other.hit || other.depth < here.depth - 0.06f) return true;
-        }
-    return false;
-}
-
-Vec3f shade(const Scene& scene, const Camera& camera, const Sample& s, float open, float lit) {
-    const Vec3f& n = s.normal;
-    const float key = std::max(0.0f, (n.dot(key_light) + 0.2f) / 1.2f) * lit;
-    const float fill = std::max(0.0f, n.dot(fill_light));
-    const float sky = (0.8f + 0.2f * n.y()) * std::pow(open, 1.3f);
-    const Vec3f half = (key_light + Vec3f::UnitZ()).normalized();
-    const float mirror = n.dot(half);
-    const float gloss = mirror > 0.7f ? 0.10f * std::pow(mirror, 28.0f) * lit : 0;  // else < 1e-5
-    const Vec3f light =
-        s.base * (0.95f * key + (0.16f * fill + 0.36f * sky) * (0.3f + 0.7f * open)) + Vec3f::Constant(gloss);
-    const float depth = camera.near > camera.far ? (camera.near - s.depth) / (camera.near - camera.far) : 0;
-    const float fade = 0.18f * std::clamp(depth, 0.0f, 1.0f);
-    return light * (1 - fade) + linear(scene.options.background) * fade;
-}
-
-/// One tile of a panel, in pixels of the panel.
-void draw_tile(Image& image, const Scene& scene, const Camera& camera, const Panel& panel, int x0, int y0,
-               int x1, int y1) {
-    const int grid = scene.grid, reach = grid + 1;
-    const std::vector<float> weights = bell(reach);
-    Tile tile{(x1 - x0) * grid + 2 * reach, (y1 - y0) * grid + 2 * reach, {}};
-    tile.samples.reserve(static_cast<std::size_t>(tile.columns) * static_cast<std::size_t>(tile.rows));
-    for (int y = 0; y < tile.rows; ++y)
-        for (int x = 0; x < tile.columns; ++x)
-            tile.samples.push_back(trace(scene, camera, x0 * grid + x - reach, y0 * grid + y - reach));
-    for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x) {
-            Vec3f sum = Vec3f::Zero();
-            int hits = 0;
-            for (int k = 0; k < grid * grid; ++k) {
-                const int sx = (x - x0) * grid + k % grid + reach, sy = (y - y0) * grid + k / grid + reach;
-                const Sample& sample = tile.at(sx, sy);
-                if (!sample.hit) continue;
-                const auto [open, lit] = smooth_light(tile, sx, sy, reach, weights.data(), camera.step);
-                Vec3f colour = shade(scene, camera, sample, open, lit);
-                if (scene.options.outline && on_outline(tile, sx, sy, std::max(1, grid / 2))) colour *= 0.3f;
-                sum += colour.cwiseMin(1.0f);
-                ++hits;
-            }
-            if (hits == 0) continue;  // the background keeps its exact bytes
-            const float all = static_cast<float>(grid * grid);
-            const Vec3f mean =
-                (sum + linear(scene.options.background) * (all - static_cast<float>(hits))) / all;
-            image.set(panel.x + x, panel.y + y, mean.unaryExpr(&linear_to_srgb));
-        }
-}
-
-void draw_panel(Image& image, const Scene& scene, const Layout& layout, const Panel& panel,
-                const ViewBox& box, const Progress& progress) {
-    const double unit = scene.model.radius, pixel = 1 / layout.pixels_per_A;
-    Camera camera;
-    camera.axes.col(0) = panel.view.right.cast<float>();
-    camera.axes.col(1) = panel.view.up.cast<float>();
-    camera.axes.col(2) = panel.view.towards.cast<float>();
-    camera.left = static_cast<float>((panel.middle.x() - 0.5 * panel.width * pixel) / unit);
-    camera.top = static_cast<float>((panel.middle.y() + 0.5 * panel.height * pixel) / unit);
-    camera.step = static_cast<float>(pixel / unit / scene.grid);
-    camera.near = static_cast<float>(box.high.z() / unit);
-    camera.far = static_cast<float>(box.low.z() / unit);
-    constexpr int side = 64;
-    const int across = (panel.width + side - 1) / side, down = (panel.height + side - 1) / side;
-    const auto tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
-    std::atomic<std::size_t> done = 0;
-    parallel_for(tiles, 1, [&](std::size_t i) {
-        const int x0 = static_cast<int>(i) % across * side, y0 = static_cast<int>(i) / across * side;
-        draw_tile(image, scene, camera, panel, x0, y0, std::min(x0 + side, panel.width),
-                  std::min(y0 + side, panel.height));
-        progress.report(static_cast<double>(++done) / static_cast<double>(tiles));
-    });
-}
 
 /// The property to colour by, of the vertices or else of the faces.
 const MeshProperty* find_property(const TriMesh& mesh, const RenderOptions& options) {
@@ -495,39 +88,189 @@ const MeshProperty* find_hidden_edges(const TriMesh& mesh, const RenderOptions& 
     return std::all_of(found->values.begin(), found->values.end(), flags) ? found : nullptr;
 }
 
+/// A mesh ready to be drawn.
+class Subject {
+ public:
+    Subject(const RenderItem& item, const RenderOptions& options)
+        : name(item.name),
+          property(find_property(*item.mesh, options)),
+          hidden_edges(find_hidden_edges(*item.mesh, options)),
+          of_faces(property && !item.mesh->find_vertex_property(*options.property)),
+          model(make_view_model(*item.mesh)),
+          rays(model.points, item.mesh->triangles) {}
+
+    std::string name;
+    const MeshProperty *property, *hidden_edges;
+    bool of_faces;
+    ViewModel model;
+    RayCaster rays;
+};
+
+std::unique_ptr<Subject> make_subject(const RenderItem& item, const RenderOptions& options) {
+    try {
+        if (item.mesh->empty()) throw InvalidInput("the mesh has no faces: there is nothing to see");
+        check(*item.mesh, "render");
+        return std::make_unique<Subject>(item, options);
+    } catch (const InvalidInput& e) {
+        throw InvalidInput(item.name.empty() ? e.what() : item.name + ": " + e.what());
+    }
+}
+
+/// Subjects, how they are turned, and the one frame that all their pictures have.
+class Studio {
+ public:
+    Studio(const std::vector<RenderItem>& items, int frames, const RenderOptions& options)
+        : options_(options), frames_(frames) {
+        options.check();
+        if (items.empty()) throw InvalidInput("no mesh is given to be drawn");
+        if (frames < 1 || frames > 10000)
+            throw InvalidInput(fmt::format("{} frames are not in 1 to 10000", frames));
+        for (const RenderItem& item : items) subjects_.push_back(make_subject(item, options));
+        if (options.property) {
+            std::vector<float> values;
+            for (const auto& s : subjects_)
+                values.insert(values.end(), s->property->values.begin(), s->property->values.end());
+            scale_ = choose_scale(values, options);
+        }
+        const std::vector<View> views = find_views(options.view);
+        for (const View& view : views) turns_.push_back(boxes_of_turns(view));
+        columns_ =
+            views.size() > 1  ? views.size()
+            : options.columns ? static_cast<std::size_t>(*options.columns)
+            : subjects_.size() < 4
+                ? subjects_.size()
+                : static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(subjects_.size()))));
+        columns_ = std::min(columns_, subjects_.size() * views.size());
+        arrange_cells(views);
+    }
+
+    Image draw(int frame, const Progress& progress) const {
+        Image image(layout_.width, layout_.height, options_.background);
+        const int grid = static_cast<int>(std::lround(std::sqrt(options_.samples)));
+        const double n = static_cast<double>(layout_.panels.size());
+        Layout layout = layout_;
+        for (std::size_t i = 0; i < layout.panels.size(); ++i) {
+            const Subject& s = *subjects_[i / turns_.size()];
+            const Turn& turn = turns_[i % turns_.size()];
+            Panel& panel = layout.panels[i];
+            panel.view = turn.views[static_cast<std::size_t>(frame)];
+            if (const auto place = middle_of(s)) panel.middle = in_view(s, panel.view, *place).head<2>();
+            const Scene scene{s.model,    s.rays, options_,       s.property,
+                              s.of_faces, scale_, s.hidden_edges, grid};
+            const double k = static_cast<double>(i);
+            draw_panel(image, scene, layout.pixels_per_A, panel,
+                       turn.boxes[static_cast<std::size_t>(frame)][i / turns_.size()],
+                       progress.part(k / n, (k + 1) / n));
+        }
+        draw_decorations(image, layout, options_, scale_);
+        return image;
+    }
+
+ private:
+    /// A view in each frame, and there the box of each subject relative to its own middle.
+    struct Turn {
+        std::vector<View> views;
+        std::vector<std::vector<ViewBox>> boxes;
+    };
+
+    Turn boxes_of_turns(const View& view) const {
+        Turn turn;
+        for (int frame = 0; frame < frames_; ++frame) {
+            turn.views.push_back(frame == 0 ? view : turned(view, 2 * M_PI * frame / frames_));
+            turn.boxes.emplace_back();
+            for (const auto& s : subjects_)
+                turn.boxes.back().push_back(box_in_view(s->model, turn.views.back()));
+        }
+        return turn;
+    }
+
+    /// A place of the world, as seen from a subject's middle.
+    static Vec3d in_view(const Subject& s, const View& view, const Vec3d& place) {
+        const Vec3d p = place - s.model.centre;
+        return {p.dot(view.right), p.dot(view.up), p.dot(view.towards)};
+    }
+
+    /// Whether the subjects take about the same room: the middle of it, or none.
+    std::optional<Vec3d> common_middle() const {
+        Vec3d low = Vec3d::Constant(1e300), high = -low;
+        double smallest = 1e300;
+        const View& any = turns_[0].views[0];
+        for (std::size_t i = 0; i < subjects_.size(); ++i) {
+            const ViewBox& box = turns_[0].boxes[0][i];
+            const Vec3d shift = -in_view(*subjects_[i], any, Vec3d::Zero());
+            low = low.cwiseMin(box.low + shift), high = high.cwiseMax(box.high + shift);
+            smallest = std::min(smallest, (box.high - box.low).norm());
+        }
+        if (subjects_.size() < 2 || smallest < 0.8 * (high - low).norm()) return {};
+        const Vec3d m = (low + high) / 2;
+        return Vec3d(m.x() * any.right + m.y() * any.up + m.z() * any.towards);
+    }
+
+    /// The place of the world in the middle of a subject's pictures; none: the middle of its box in the view.
+    std::optional<Vec3d> middle_of(const Subject& s) const {
+        if (options_.focus) return *options_.focus;
+        if (common_) return common_;
+        if (frames_ > 1) return s.model.centre;
+        return {};
+    }
+
+    /// What subject i needs in all frames, about the one place that they turn about.
+    ViewBox room_of(std::size_t i, const Turn& turn) const {
+        const std::optional<Vec3d> place = common_ || frames_ == 1 ? common_ : middle_of(*subjects_[i]);
+        if (!place) return turn.boxes[0][i];
+        Vec3d reach = Vec3d::Zero();
+        for (std::size_t f = 0; f < turn.views.size(); ++f) {
+            const Vec3d m = in_view(*subjects_[i], turn.views[f], *place);
+            reach = reach.cwiseMax(turn.boxes[f][i].high - m).cwiseMax(m - turn.boxes[f][i].low);
+        }
+        const Vec3d m = in_view(*subjects_[i], turn.views[0], *place);
+        return {m - reach, m + reach};
+    }
+
+    void arrange_cells(const std::vector<View>& views) {
+        std::vector<Cell> cells;
+        common_ = common_middle();
+        for (std::size_t i = 0; i < subjects_.size(); ++i)
+            for (std::size_t v = 0; v < views.size(); ++v) {
+                const ViewBox box = room_of(i, turns_[v]);
+                cells.push_back({views[v], box, box.middle(), v == 0 ? subjects_[i]->name : std::string()});
+            }
+        layout_ = arrange(cells, columns_, options_);
+    }
+
+    const RenderOptions& options_;
+    int frames_;
+    std::vector<std::unique_ptr<Subject>> subjects_;
+    std::optional<ColourScale> scale_;
+    std::vector<Turn> turns_;  // one a view
+    std::size_t columns_ = 1;
+    std::optional<Vec3d> common_;  // the middle of all, where they take about the same room
+    Layout layout_;
+};
+
 }  // namespace
 
 bool can_render() { return true; }
 
-Image render(const TriMesh& mesh, const RenderOptions& options, const Progress& progress) {
-    options.check();
-    if (mesh.empty()) throw InvalidInput("the mesh has no faces: there is nothing to see");
-    check(mesh, "render");
-    const MeshProperty* property = find_property(mesh, options);
-    std::optional<ColourScale> scale;
-    if (property) scale = choose_scale(property->values, options);
-
-    const Model model = make_model(mesh);
-    const std::vector<View> views = find_views(options.view);
-    std::vector<ViewBox> boxes;
-    for (const View& view : views) boxes.push_back(box_in_view(model, view));
-    const Layout layout = arrange(views, boxes, options);
-    Image image(layout.width, layout.height, options.background);
-
+void render_turntable(const std::vector<RenderItem>& items, int frames, const RenderOptions& options,
+                      const std::function<void(int, const Image&)>& take, const Progress& progress) {
     progress.report(0);
-    const RayCaster rays(model.points, mesh.triangles);
-    const int grid = static_cast<int>(std::lround(std::sqrt(options.samples)));
-    const bool of_faces = property && !mesh.find_vertex_property(*options.property);
-    const Scene scene{model, rays, options, property, of_faces, scale, find_hidden_edges(mesh, options),
-                      grid};
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        const double n = static_cast<double>(views.size()), k = static_cast<double>(i);
-        draw_panel(image, scene, layout, layout.panels[i], boxes[i], progress.part(k / n, (k + 1) / n));
-    }
-    draw_decorations(image, layout, options, scale);
-    return image;
+    const Studio studio(items, frames, options);
+    for (int frame = 0; frame < frames; ++frame)
+        take(frame, studio.draw(frame, progress.part(double(frame) / frames, (frame + 1.0) / frames)));
 }
 
 #endif
+
+Image render(const std::vector<RenderItem>& items, const RenderOptions& options, const Progress& progress) {
+    Image image;
+    render_turntable(
+        items, 1, options, [&](int, const Image& drawn) { image = drawn; }, progress);
+    return image;
+}
+
+Image render(const TriMesh& mesh, const RenderOptions& options, const Progress& progress) {
+    return render({{&mesh, ""}}, options, progress);
+}
 
 }  // namespace vdbgeo

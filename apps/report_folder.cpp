@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "apps/report_words.h"
+#include "apps/subcommand.h"
 #include "vdbgeo/view/page_images.h"
 
 namespace vdbgeo::app {
@@ -83,22 +84,19 @@ std::optional<double> number_of(const Json& object, const char* key) {
     return found->get<double>();
 }
 
-/// A word of a command line as it is typed: in quotes where a shell would take it apart.
-std::string typed(const std::string& word) {
-    const std::string plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=./,:%@^";
-    if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
-    std::string quoted = "'";
-    for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-    return quoted + "'";
-}
-
-std::string command_of(const Json& stage) {
-    const auto words = stage.find("command");
-    if (words == stage.end() || !words->is_array() || words->empty()) return {};
-    std::string line = "vdbgeo";
-    for (const Json& word : *words)
-        if (word.is_string()) line += " " + typed(word.get<std::string>());
-    return line;
+/// The command lines of a stage as they are typed, one a line.
+std::string commands_of(const Json& stage) {
+    const auto lines = stage.find("commands");
+    std::string text;
+    if (lines == stage.end() || !lines->is_array()) return text;
+    for (const Json& line : *lines) {
+        std::vector<std::string> words;
+        if (line.is_array())
+            for (const Json& word : line)
+                if (word.is_string()) words.push_back(word.get<std::string>());
+        if (!words.empty()) text += (text.empty() ? "" : "\n") + command_line("vdbgeo", words);
+    }
+    return text;
 }
 
 RunStage stage_of(const Json& json) {
@@ -108,7 +106,7 @@ RunStage stage_of(const Json& json) {
     if (stage.title.empty()) stage.title = words_for(stage.name).label;
     stage.status = text_of(json, "status");
     stage.error = text_of(json, "error");
-    stage.command = command_of(json);
+    stage.command = commands_of(json);
     stage.seconds = number_of(json, "seconds");
     const auto warnings = json.find("warnings");
     if (warnings != json.end() && warnings->is_array())

@@ -197,22 +197,57 @@ async function check_page(page, has) {
 const wide_elements = () => [...document.querySelectorAll("body *")].filter((e) => e.getBoundingClientRect().right > innerWidth + 1)
     .slice(0, 5).map((e) => e.tagName + (e.className ? `.${e.className}` : "")).join(" ");
 
+// One finger turns, two zoom.
+async function check_touch(page) {
+  const canvas = page.locator("#viewer .stage > canvas").first();
+  await canvas.scrollIntoViewIfNeeded();
+  const box = await canvas.boundingBox(), x = box.x + box.width / 2, y = box.y + box.height / 2;
+  const client = await page.context().newCDPSession(page);
+  const touch = (type, ...points) => client.send("Input.dispatchTouchEvent", {type, touchPoints: points.map(([px, py], id) => ({x: px, y: py, id}))});
+  await changes(page, "a finger", async () => {
+    await touch("touchStart", [x, y]);
+    await touch("touchMove", [x + 60, y + 10]);
+    await touch("touchEnd");
+  });
+  const before = await page.evaluate(() => window.vdbgeo.camera().half_height);
+  await touch("touchStart", [x - 30, y], [x + 30, y]);
+  await touch("touchMove", [x - 60, y], [x + 60, y]);
+  await touch("touchEnd");
+  await page.evaluate(() => window.vdbgeo.settled());
+  const after = await page.evaluate(() => window.vdbgeo.camera().half_height);
+  check(after < 0.8 * before, `two fingers apart enlarge the picture (half of its height from ${before} to ${after})`);
+}
+
+// Where motion is welcome the camera flies, and arrives.
+async function check_flight(page) {
+  const camera = () => page.evaluate(() => window.vdbgeo.settled().then(() => window.vdbgeo.camera()));
+  const home = await camera();
+  await page.getByRole("button", {name: "View from the top"}).click();
+  const top = await camera();
+  await page.getByRole("button", {name: "Reset the view"}).click();
+  const back = await camera();
+  const apart = (a, b) => Math.hypot(...a.position.map((p, i) => p - b.position[i])) / home.half_height;
+  check(apart(home, top) > 0.1, "the camera flies to the top");
+  check(apart(home, back) < 0.001, "the camera flies back");
+}
+
 async function check_narrow() {
   for (const width of [400, 360]) {
     const page = await open({viewport: {width, height: 800}, hasTouch: true});
     const has = await claims(page);
-    if (has.viewer) await ready(page);
+    if (has.viewer && !await ready(page)) return;
     const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
     check(over <= 0, `no sideways scrolling at ${width} pixels (${over} too many: ${await page.evaluate(wide_elements)})`);
+    if (has.viewer && width === 400) await check_touch(page);
     await page.screenshot({path: `${out}/narrow_${width}.png`, fullPage: true});
     await page.context().close();
   }
 }
 
 async function check_dark() {
-  const page = await open({colorScheme: "dark"});
+  const page = await open({colorScheme: "dark", reducedMotion: "no-preference"});
   const has = await claims(page);
-  if (has.viewer && await ready(page)) await picture(page);
+  if (has.viewer && await ready(page)) await check_flight(page);
   const luminance = await page.evaluate(() => getComputedStyle(document.body).backgroundColor.match(/\d+/g).slice(0, 3).reduce((a, b) => a + Number(b), 0) / 3);
   check(luminance < 80, "the page is dark where the reader wants it");
   await page.screenshot({path: `${out}/dark.png`, fullPage: true});

@@ -61,7 +61,8 @@ async function start_viewer(place) {
     viewer = new Viewer(place, data);
     await viewer.start();
     window.vdbgeo = for_programs(viewer);
-    start_pockets(data.pockets ?? [], (number) => viewer.choose_pocket(number));
+    const tables = [...document.querySelectorAll("#pocket-table, #pocket-table-more")];
+    if (tables.length && data.pockets?.length) start_pockets(tables, data.pockets, (number) => viewer.choose_pocket(number));
     place.dataset.ready = "true";
   } catch (error) {
     place.classList.remove("live");

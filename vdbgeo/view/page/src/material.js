@@ -3,12 +3,18 @@
 import {DoubleSide, ShaderMaterial, Vector2, Vector3, Vector4} from "three";
 
 const vertex = /* glsl */ `
-attribute vec4 tint;
-uniform float edges;
+attribute vec4 tint, tint_next, tint_last;  // of the vertex, and of the two corners that follow in its face
+uniform float edges, crisp;
+flat varying vec3 vFirst, vSecond, vThird;  // a face has those of its third corner
 varying vec3 vTint, vNormal, vView, vPlace, vCorner;
 vec3 linear(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
 void main() {
   vTint = linear(tint.rgb);
+  if (crisp > 0.0) {
+    vFirst = linear(tint_next.rgb);
+    vSecond = linear(tint_last.rgb);
+    vThird = vTint;
+  } else vFirst = vSecond = vThird = vec3(0.0);
 #ifdef FACETS
   vNormal = vec3(0.0);
 #else
@@ -16,7 +22,7 @@ void main() {
 #endif
   vPlace = position;
   int corner = gl_VertexID % 3;  // of meshes without an index only
-  vCorner = edges > 0.0 ? vec3(corner == 0, corner == 1, corner == 2) : vec3(1.0);
+  vCorner = edges > 0.0 || crisp > 0.0 ? vec3(corner == 0, corner == 1, corner == 2) : vec3(1.0);
   vec4 view = modelViewMatrix * vec4(position, 1.0);
   vView = view.xyz;
   gl_Position = projectionMatrix * view;
@@ -27,6 +33,8 @@ uniform vec4 plane;      // what lies beyond dot(p, xyz) = w is cut off
 uniform vec3 inside, paper, ink;
 uniform vec2 depths;     // distances where fading begins and ends
 uniform float edges;
+uniform float crisp;     // 1: a face has the colours of its corners side by side (classes), not blended
+flat varying vec3 vFirst, vSecond, vThird;
 varying vec3 vTint, vNormal, vView, vPlace, vCorner;
 vec3 srgb(vec3 c) { return mix(c * 12.92, 1.055 * pow(max(c, 0.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c)); }
 void main() {
@@ -36,7 +44,15 @@ void main() {
   vec3 base = vTint;
 #else
   vec3 n = normalize(vNormal) * (gl_FrontFacing ? 1.0 : -1.0);
-  vec3 base = gl_FrontFacing ? vTint : inside;
+  vec3 tint = vTint;
+  if (crisp > 0.0) {
+    vec3 part = vCorner;  // corners of one class stand together: borders run from middle to middle of edges
+    if (vFirst == vSecond) part = vec3(part.x + part.y, 0.0, part.z);
+    else if (vFirst == vThird) part = vec3(part.x + part.z, part.y, 0.0);
+    else if (vSecond == vThird) part = vec3(part.x, part.y + part.z, 0.0);
+    tint = part.x >= max(part.y, part.z) ? vFirst : part.y >= part.z ? vSecond : vThird;
+  }
+  vec3 base = gl_FrontFacing ? tint : inside;
 #endif
   vec3 key = vec3(-0.42, 0.53, 0.74);
   float sky = 0.5 + 0.5 * n.y;
@@ -45,7 +61,7 @@ void main() {
   vec3 colour = base * light + gloss;
 #ifndef FACETS
   // A hollow without shadows looks like a bump: the inside grows darker with the distance from the cut.
-  if (!gl_FrontFacing) colour *= mix(1.0, 0.38, smoothstep(0.0, 0.75, (plane.w - dot(vPlace, plane.xyz)) / (depths.y - depths.x)));
+  if (!gl_FrontFacing) colour *= mix(1.0, 0.38, smoothstep(0.0, 0.5, (plane.w - dot(vPlace, plane.xyz)) / (depths.y - depths.x)));
 #endif
   if (edges > 0.0) {
     vec3 size = fwidth(vCorner);
@@ -74,5 +90,6 @@ export function make_uniforms(inside) {
     ink: {value: new Vector3(0.01, 0.01, 0.015)},
     depths: {value: new Vector2(0, 1)},
     edges: {value: 0},
+    crisp: {value: 0},
   };
 }

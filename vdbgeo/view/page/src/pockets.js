@@ -1,18 +1,18 @@
-// Rows of the table of pockets are buttons that show the pocket.
+// Rows of the tables of pockets are buttons that show the pocket.
 
-/** Long tables continue in another one; `choose(number)` is called with a pocket's number, or with null when none is chosen any more. */
-export function start_pockets(pockets, choose) {
+/** `choose(number)` is called with a pocket's number, or with null when none is chosen any more. */
+export function start_pockets(tables, pockets, choose) {
   const rows = new Map();
   let chosen = null;
   const mark = (number) => {
-    for (const [row, n] of rows) row.setAttribute("aria-selected", n === number);
+    for (const [n, row] of rows) row.setAttribute("aria-selected", n === number);
     chosen = number;
     choose(number);
   };
-  for (const row of document.querySelectorAll("#pockets tr[data-pocket]")) {
+  for (const row of tables.flatMap((table) => [...table.querySelectorAll("tr[data-pocket]")])) {
     const number = Number(row.dataset.pocket);
     if (!pockets.some((p) => p.id === number)) continue;
-    rows.set(row, number);
+    rows.set(number, row);
     row.tabIndex = 0;
     row.classList.add("choice");
     row.setAttribute("aria-selected", false);
@@ -23,7 +23,8 @@ export function start_pockets(pockets, choose) {
       mark(number);
     });
   }
-  for (const table of new Set([...rows.keys()].map((row) => row.closest("table")))) {
+  if (!rows.size) return;
+  for (const table of tables) {
     table.setAttribute("role", "grid");  // rows of plain tables cannot be selected
     table.setAttribute("aria-label", "Pockets. Enter on a row shows the pocket in the viewer, Escape leaves it");
   }

@@ -16,10 +16,10 @@ function make_geometry(arrays, index) {
   return geometry;
 }
 
-function set_tint(geometry, values) {
-  const old = geometry.attributes.tint;
+function set_tint(geometry, values, name = "tint") {
+  const old = geometry.attributes[name];
   if (!old) {
-    geometry.setAttribute("tint", new BufferAttribute(values, 4, true));
+    geometry.setAttribute(name, new BufferAttribute(values, 4, true));
   } else {
     old.array = values;
     old.needsUpdate = true;
@@ -64,19 +64,24 @@ export class Surface extends Part {
     this.mesh.frustumCulled = false;
   }
 
-  // Lines along edges need the corners of each face by themselves; that copy is made when they are first wanted.
-  show_edges(on) {
-    this.uniforms.edges.value = on ? 0.75 : 0;
-    if (on && !this.torn) {
-      this.torn = make_geometry({position: spread(this.position, 3, this.index), normal: spread(this.normal, 3, this.index),
-                                 tint: spread(this.tint, 4, this.index)});
+  // Lines along edges and crisp borders of classes need the corners of each face by themselves; that copy is made
+  // when it is first wanted.
+  choose_geometry() {
+    const {edges, crisp} = this.uniforms;
+    if (edges.value > 0 || crisp.value > 0) {
+      this.torn ??= make_geometry({position: spread(this.position, 3, this.index), normal: spread(this.normal, 3, this.index)});
+      const of_corners = [0, 1, 2].map((k) => this.index.map((_, i) => this.index[i - i % 3 + (i % 3 + k) % 3]));
+      ["tint", "tint_next", "tint_last"].forEach((name, k) => set_tint(this.torn, spread(this.tint, 4, of_corners[k]), name));
+      this.mesh.geometry = this.torn;
+    } else {
+      set_tint(this.smooth, this.tint);
+      this.mesh.geometry = this.smooth;
     }
-    this.mesh.geometry = on ? this.torn : this.smooth;
-    this.send_tint();
   }
 
-  send_tint() {
-    set_tint(this.mesh.geometry, this.mesh.geometry === this.torn ? spread(this.tint, 4, this.index) : this.tint);
+  show_edges(on) {
+    this.uniforms.edges.value = on ? 0.75 : 0;
+    this.choose_geometry();
   }
 
   /** Colours by property `key` ("" plain), with the vertices of pocket `pocket` picked out. */
@@ -88,7 +93,8 @@ export class Surface extends Part {
         if (numbers[i] === pocket) { tint[4 * i] = picked[0]; tint[4 * i + 1] = picked[1]; tint[4 * i + 2] = picked[2]; }
     }
     this.tint = tint;
-    this.send_tint();
+    this.uniforms.crisp.value = this.property(key)?.kind === "category" ? 1 : 0;
+    this.choose_geometry();
   }
 
   /** Cut off where sign · coordinate > sign · at; null: whole. */

@@ -109,7 +109,7 @@ export class Viewer {
     if (part.mesh) return;
     // Each part cuts in its own way and has its own lines; light and paper are common.
     const own = make_uniforms(inside);
-    await part.load({...this.uniforms, plane: own.plane, edges: own.edges});
+    await part.load({...this.uniforms, plane: own.plane, edges: own.edges, crisp: own.crisp});
     part.clip(null);
     this.view.scene.add(part.mesh);
   }

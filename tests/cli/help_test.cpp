@@ -12,7 +12,7 @@ namespace {
 const Words all_commands{"info",     "convert",    "phantom",   "denoise",  "edges",          "transform",
                          "flow",     "surface",    "remesh",    "simplify", "smooth",         "repair",
                          "measure",  "components", "curvature", "pockets",  "tetrahedralize", "cutaway",
-                         "validate", "render",     "model"};
+                         "validate", "render",     "model",     "report"};
 
 struct Promise {
     const char* command;
@@ -52,7 +52,8 @@ const std::vector<Promise> promises{
       "--width INT=1600", "PNG"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
-    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
+    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}},
+    {"report", {"--faces UINT=200000", "--tets UINT=200000", "--max-size TEXT=10M", "--title"}}};
 
 /// The words of the lines below "Example:" that call a program.
 std::vector<Words> examples_in(const std::string& help) {
@@ -141,6 +142,7 @@ TEST_F(Help, ExamplesRun) {
           "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
           "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
           "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
-          "pockets.png",      "tips.json",         "inside.png", "half.ply",          "peeled.png"})
+          "pockets.png",      "tips.json",         "inside.png", "half.ply",          "peeled.png",
+          "groel/report.html"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

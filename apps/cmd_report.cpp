@@ -23,10 +23,12 @@ void run_report(const ReportOptions& o, Session& session) {
     Report report;
     const std::string out = write_report(o, session, report);
     session.end_stage();
-    for (const auto& [file, why] : report.damaged) session.warn(fmt::format("{}/{}: {}", o.folder, file, why));
+    for (const auto& [file, why] : report.damaged)
+        session.warn(fmt::format("{}/{}: {}", o.folder, file, why));
     if (!have_page()) session.warn("this build has no script for the page: nothing in it can be turned");
     for (const std::string& note : report.notes) session.say(note);
-    session.say(fmt::format("{}: {:.2f} MB", out == "-" ? "page" : out, static_cast<double>(report.html.size()) / (1 << 20)));
+    session.say(fmt::format("{}: {:.2f} MB", out == "-" ? "page" : out,
+                            static_cast<double>(report.html.size()) / (1 << 20)));
     session.result({{"out", out},
                     {"bytes", report.html.size()},
                     {"faces", report.faces},
@@ -48,13 +50,15 @@ Command report_command() {
                 auto o = std::make_shared<ReportOptions>();
                 auto size = std::make_shared<std::string>("10M");
                 app.add_option("folder", o->folder, "Folder of a model run, finished or not")->required();
-                app.add_option("-o,--out", o->out, "Page to write, - for standard output [report.html in the folder]");
+                app.add_option("-o,--out", o->out,
+                               "Page to write, - for standard output [report.html in the folder]");
                 app.add_option("--title", o->title, "Heading of the page [the map's name]");
                 app.add_option("--faces", o->faces, "Simplify the surface for the page to this many faces")
                     ->capture_default_str();
                 app.add_option("--tets", o->tets, "Fill it for the page with at most this many tetrahedra")
                     ->capture_default_str();
-                app.add_option("--max-size", *size, "Size of the page in bytes, such as 10M: what does not fit is made coarser")
+                app.add_option("--max-size", *size,
+                               "Size of the page in bytes, such as 10M: what does not fit is made coarser")
                     ->capture_default_str();
                 return [o, size](Session& session) {
                     o->max_bytes = parse_bytes("--max-size", *size);

@@ -25,7 +25,8 @@ constexpr std::size_t pockets_shown = 50;
 const char* plural(std::uint64_t n, const char* one, const char* more) { return n == 1 ? one : more; }
 
 /// The first of these stages that has the number.
-std::optional<double> number_of(const ReportFolder& folder, const std::vector<const char*>& stages, const char* key) {
+std::optional<double> number_of(const ReportFolder& folder, const std::vector<const char*>& stages,
+                                const char* key) {
     for (const char* name : stages)
         if (const RunStage* s = folder.stage(name))
             if (const auto value = number_in(s->result, key)) return value;
@@ -87,14 +88,18 @@ std::vector<std::string> summary_text(const Facts& f, const std::vector<PocketRo
     std::string what = "This page shows a geometric model that vdbgeo made";
     what += f.map_name.empty() ? " from a density map." : fmt::format(" from the density map {}", f.map_name);
     if (!f.map_name.empty())
-        what += f.size.empty() ? "." : fmt::format(": a box of {} voxels{}.", f.size,
-                                                   f.voxel.empty() ? "" : ", " + voxel_text(f.voxel) + " each");
-    what += " A density map tells how much matter there is at each place of a specimen; the model is the surface of "
-            "what is dense, with numbers for its shape.";
+        what += f.size.empty() ? "."
+                               : fmt::format(": a box of {} voxels{}.", f.size,
+                                             f.voxel.empty() ? "" : ", " + voxel_text(f.voxel) + " each");
+    what +=
+        " A density map tells how much matter there is at each place of a specimen; the model is the surface "
+        "of "
+        "what is dense, with numbers for its shape.";
     std::string found;
     if (f.isovalue)
-        found += fmt::format("The surface is drawn where the density is {} (the isovalue): denser places are inside. ",
-                             number_text(*f.isovalue));
+        found += fmt::format(
+            "The surface is drawn where the density is {} (the isovalue): denser places are inside. ",
+            number_text(*f.isovalue));
     if (f.area_A2)
         found += fmt::format("It has an area of {} Å²{}{}. ", number_text(*f.area_A2),
                              f.volume_A3 ? fmt::format(" and encloses {}", volume_text(*f.volume_A3)) : "",
@@ -103,11 +108,12 @@ std::vector<std::string> summary_text(const Facts& f, const std::vector<PocketRo
                                       : "");
     if (!pockets.empty()) {
         const auto area = pockets[0].number("area_A2"), depth = pockets[0].number("depth_A");
-        found += fmt::format("{} {} where it bends inward {} found", count_text(pockets.size()),
-                             plural(pockets.size(), "pocket", "pockets"), plural(pockets.size(), "was", "were"));
+        found +=
+            fmt::format("{} {} where it bends inward {} found", count_text(pockets.size()),
+                        plural(pockets.size(), "pocket", "pockets"), plural(pockets.size(), "was", "were"));
         if (area && depth)
-            found += fmt::format("; the first by rank has an area of {} Å² and is {} Å deep", number_text(*area),
-                                 number_text(*depth));
+            found += fmt::format("; the first by rank has an area of {} Å² and is {} Å deep",
+                                 number_text(*area), number_text(*depth));
         found += ". ";
     }
     if (f.tets)
@@ -136,7 +142,8 @@ PageTerms facts_terms(const Facts& f, std::size_t pockets) {
 std::string opening_text(const PocketRow& row) {
     const auto rims = row.number("rims");
     std::string text = !rims ? "" : *rims == 0 ? "closed cavity" : *rims == 1 ? "pit" : "channel or groove";
-    if (row.number("touches_border").value_or(0) > 0) text += text.empty() ? "at the border" : ", at the border";
+    if (row.number("touches_border").value_or(0) > 0)
+        text += text.empty() ? "at the border" : ", at the border";
     return text;
 }
 
@@ -152,7 +159,8 @@ std::vector<std::string> sampled_columns(const std::vector<PocketRow>& rows) {
     if (rows.empty()) return names;
     for (const auto& [name, value] : rows[0].values)
         if (name.rfind("mean_", 0) == 0 && name != "mean_k1_per_A" && name != "mean_k2_per_A" &&
-            name != "mean_H_per_A" && name != "mean_K_per_A2" && name != "mean_depth_A" && names.size() < most)
+            name != "mean_H_per_A" && name != "mean_K_per_A2" && name != "mean_depth_A" &&
+            names.size() < most)
             names.push_back(name);
     return names;
 }
@@ -162,17 +170,20 @@ void add_pockets(ReportContent& c, const std::vector<PocketRow>& rows) {
     const bool outward = rows[0].number("kind").value_or(0) > 0;
     c.pockets_text.push_back(
         outward ? "Patches of the surface that stick out, the most prominent first."
-                : "Patches of the surface that bend inward, where small molecules may bind; those that hold most space "
-                  "come first. Depth is measured below a sheet that lies tight around the specimen, or below a ball that "
-                  "rolls over it; the mouth is the opening. Curvatures are means over the patch, negative where the "
+                : "Patches of the surface that bend inward, where small molecules may bind; those that hold "
+                  "most space "
+                  "come first. Depth is measured below a sheet that lies tight around the specimen, or below "
+                  "a ball that "
+                  "rolls over it; the mouth is the opening. Curvatures are means over the patch, negative "
+                  "where the "
                   "surface is hollow; the position is that of its middle in the map's frame.");
     if (have_page() && !c.surface.empty())
         c.pockets_text.push_back("Choose a row to see the pocket in the view above.");
     c.pockets.id = "pocket-table";
     c.pockets.shown = pockets_shown;
     c.pockets.caption = outward ? "Protrusions by rank" : "Pockets by rank";
-    c.pockets.columns = {{"Rank"}, {"Area (Å²)"}, {"Depth (Å)"}, {"Mouth (Å²)"}, {"Mean k1 (1/Å)"}, {"Mean k2 (1/Å)"},
-                         {"x (Å)"}, {"y (Å)"}, {"z (Å)"}, {"Form", false}};
+    c.pockets.columns = {{"Rank"},          {"Area (Å²)"}, {"Depth (Å)"}, {"Mouth (Å²)"}, {"Mean k1 (1/Å)"},
+                         {"Mean k2 (1/Å)"}, {"x (Å)"},     {"y (Å)"},     {"z (Å)"},      {"Form", false}};
     const std::vector<std::string> sampled = sampled_columns(rows);
     for (const std::string& name : sampled) c.pockets.columns.push_back({"Mean " + name.substr(5)});
     for (const PocketRow& row : rows) {
@@ -217,16 +228,19 @@ void add_figures(ReportContent& c, ReportFolder& folder) {
     }
     const std::string spectra = folder.svg("spectra.svg");
     if (!spectra.empty())
-        c.noise.push_back({"Power spectra before and after",
-                           "How strong detail of each fineness is, coarse on the left, fine on the right. Noise removal "
-                           "should lower the right end and leave the left as it was.",
-                           spectra, {}});
+        c.noise.push_back(
+            {"Power spectra before and after",
+             "How strong detail of each fineness is, coarse on the left, fine on the right. Noise removal "
+             "should lower the right end and leave the left as it was.",
+             spectra,
+             {}});
     for (const FileWords& f : plot_files()) {
         const std::string svg = folder.svg(f.file);
         if (!svg.empty()) c.plots.push_back({f.title, f.caption, svg, {}});
     }
     for (const FileWords& f : picture_files())
-        if (auto png = folder.picture(f.file, f.title)) c.pictures.push_back({f.title, f.caption, "", std::move(*png)});
+        if (auto png = folder.picture(f.file, f.title))
+            c.pictures.push_back({f.title, f.caption, "", std::move(*png)});
     for (const char* file : {"mean.png", "pockets_picture.png", "denoised.png", "map.png"})
         if (!c.poster) c.poster = folder.picture(file, "The surface of the specimen, seen from three sides");
 }
@@ -251,8 +265,13 @@ void add_own_measures(ReportContent& c, Facts& facts, const TriMesh& mesh, const
     facts.area_A2 = m.area_A2;
     facts.volume_A3 = m.volume_A3;
     facts.pieces = static_cast<double>(m.components);
-    Json j{{"vertices", m.vertices}, {"faces", m.faces}, {"components", m.components}, {"closed", m.closed},
-           {"area_A2", m.area_A2}, {"min_angle_deg", m.min_angle_deg}, {"max_angle_deg", m.max_angle_deg}};
+    Json j{{"vertices", m.vertices},
+           {"faces", m.faces},
+           {"components", m.components},
+           {"closed", m.closed},
+           {"area_A2", m.area_A2},
+           {"min_angle_deg", m.min_angle_deg},
+           {"max_angle_deg", m.max_angle_deg}};
     if (m.volume_A3) j["volume_A3"] = *m.volume_A3;
     if (m.genus) j["genus"] = *m.genus;
     PageNumbers numbers{"The surface", fmt::format("Measured for this page on {}.", file), {}};
@@ -264,9 +283,11 @@ void add_own_measures(ReportContent& c, Facts& facts, const TriMesh& mesh, const
 
 PageTable settings_table(const char* id, const char* caption, const Json& object) {
     PageTable table{id, caption, {{"Name", false}, {"Value", false}}, {}};
-    const std::function<void(const std::string&, const Json&, int)> add = [&](const std::string& name, const Json& value, int depth) {
+    const std::function<void(const std::string&, const Json&, int)> add = [&](const std::string& name,
+                                                                              const Json& value, int depth) {
         if (value.is_object() && depth < 4 && !value.empty()) {
-            for (const auto& [key, inner] : value.items()) add(name.empty() ? key : name + "." + key, inner, depth + 1);
+            for (const auto& [key, inner] : value.items())
+                add(name.empty() ? key : name + "." + key, inner, depth + 1);
         } else if (!(value.is_string() && value.get<std::string>().empty())) {
             table.rows.push_back({name, value.is_object() ? "…" : value_text(value)});
         }
@@ -286,16 +307,20 @@ void add_how(ReportContent& c, const ReportFolder& folder) {
     if (!folder.text("preset").empty()) text += fmt::format("Settings for: {}. ", folder.text("preset"));
     if (seconds) text += fmt::format("The whole run took {}. ", time_text(*seconds));
     if (!folder.stages().empty())
-        c.how_text.push_back(text + "Each step can be done again by itself, in the folder of the results, with the command shown.");
+        c.how_text.push_back(
+            text +
+            "Each step can be done again by itself, in the folder of the results, with the command shown.");
     for (const RunStage& s : folder.stages()) {
         PageStage stage{s.title, status_word(s), s.seconds ? time_text(*s.seconds) : "", s.command, {}};
         if (!s.error.empty()) stage.remarks.push_back("Error: " + s.error);
         for (const std::string& w : s.warnings) stage.remarks.push_back("Warning: " + w);
-        if (s.status == "reused") stage.remarks.push_back("Taken from an earlier run with the same input and options.");
+        if (s.status == "reused")
+            stage.remarks.push_back("Taken from an earlier run with the same input and options.");
         c.how.push_back(std::move(stage));
     }
-    for (const auto& [key, id, caption] : {std::tuple{"options", "options-table", "All options"},
-                                           std::tuple{"versions", "versions-table", "Versions of the program and its libraries"}}) {
+    for (const auto& [key, id, caption] :
+         {std::tuple{"options", "options-table", "All options"},
+          std::tuple{"versions", "versions-table", "Versions of the program and its libraries"}}) {
         const auto found = summary.find(key);
         if (found == summary.end() || !found->is_object()) continue;
         PageTable table = settings_table(id, caption, *found);
@@ -338,8 +363,8 @@ void read_meshes(Meshes& m, ReportFolder& folder, std::string& surface_file, Ses
 }
 
 template <class Mesh>
-void pack(std::optional<Mesh>& mesh, std::uint64_t wanted, PageMesh& shown, const char* file, ReportFolder& folder,
-          const Progress& progress) {
+void pack(std::optional<Mesh>& mesh, std::uint64_t wanted, PageMesh& shown, const char* file,
+          ReportFolder& folder, const Progress& progress) {
     shown = {};
     if (!mesh || wanted == 0) return;
     try {
@@ -395,8 +420,9 @@ class ReportMaker {
         std::string folder_name = fs::weakly_canonical(fs::path(options_.folder)).filename().string();
         content_.title = !options_.title.empty() ? options_.title : !stem.empty() ? stem : folder_name;
         if (content_.title.empty()) content_.title = "Report";
-        content_.subtitle = fmt::format("Geometric model of {}, made with vdbgeo {}",
-                                        facts_.map_name.empty() ? "a density map" : facts_.map_name, VDBGEO_VERSION);
+        content_.subtitle =
+            fmt::format("Geometric model of {}, made with vdbgeo {}",
+                        facts_.map_name.empty() ? "a density map" : facts_.map_name, VDBGEO_VERSION);
         content_.summary = summary_text(facts_, pockets_);
         content_.facts = facts_terms(facts_, pockets_.size());
         add_figures(content_, folder_);
@@ -422,10 +448,12 @@ class ReportMaker {
     void finish() {
         content_.surface = meshes_.shown_surface.json;
         content_.tets = meshes_.shown_tets.json;
-        content_.pocket_places = content_.surface.empty() ? std::vector<PagePocket>() : pocket_places(pockets_);
+        content_.pocket_places =
+            content_.surface.empty() ? std::vector<PagePocket>() : pocket_places(pockets_);
         content_.specimen.clear();
         if (have_page() && !(content_.surface.empty() && content_.tets.empty()))
-            content_.specimen.push_back("Drag to turn, scroll to come closer; choose colours and cuts beside the picture.");
+            content_.specimen.push_back(
+                "Drag to turn, scroll to come closer; choose colours and cuts beside the picture.");
         for (const PageMesh* m : {&meshes_.shown_surface, &meshes_.shown_tets})
             content_.specimen.insert(content_.specimen.end(), m->remarks.begin(), m->remarks.end());
         content_.specimen.insert(content_.specimen.end(), left_out_.begin(), left_out_.end());
@@ -458,21 +486,25 @@ class ReportMaker {
                                             tets > 0 ? "tetrahedra are" : "surface in three dimensions is"));
             return tets > 0 ? pack_tets() : pack_surface();
         }
-        throw InvalidInput(fmt::format("{}: the page takes {} bytes without any picture; allow more (--max-size)",
-                                       options_.folder, report_.html.size()));
+        throw InvalidInput(
+            fmt::format("{}: the page takes {} bytes without any picture; allow more (--max-size)",
+                        options_.folder, report_.html.size()));
     }
 
     bool drop_largest_picture() {
         if (!content_.pictures.empty()) {
-            const auto largest = std::max_element(content_.pictures.begin(), content_.pictures.end(), [](const PageFigure& a, const PageFigure& b) {
-                return a.image.bytes.size() < b.image.bytes.size();
-            });
-            left_out_.push_back(fmt::format("The picture “{}” is left out for the page's size.", largest->title));
+            const auto largest = std::max_element(content_.pictures.begin(), content_.pictures.end(),
+                                                  [](const PageFigure& a, const PageFigure& b) {
+                                                      return a.image.bytes.size() < b.image.bytes.size();
+                                                  });
+            left_out_.push_back(
+                fmt::format("The picture “{}” is left out for the page's size.", largest->title));
             content_.pictures.erase(largest);
             return true;
         }
         if (!content_.comparisons.empty()) {
-            left_out_.push_back(fmt::format("The sections across {} are left out for the page's size.", content_.comparisons.back().axis));
+            left_out_.push_back(fmt::format("The sections across {} are left out for the page's size.",
+                                            content_.comparisons.back().axis));
             content_.comparisons.pop_back();
             return true;
         }
@@ -483,7 +515,8 @@ class ReportMaker {
 
     void tell() {
         report_.notes = meshes_.shown_surface.remarks;
-        report_.notes.insert(report_.notes.end(), meshes_.shown_tets.remarks.begin(), meshes_.shown_tets.remarks.end());
+        report_.notes.insert(report_.notes.end(), meshes_.shown_tets.remarks.begin(),
+                             meshes_.shown_tets.remarks.end());
         report_.notes.insert(report_.notes.end(), left_out_.begin(), left_out_.end());
         report_.faces = meshes_.shown_surface.shown, report_.tets = meshes_.shown_tets.shown;
         if (meshes_.surface) report_.faces_full = meshes_.surface->mesh().triangles.size();
@@ -513,7 +546,8 @@ Report make_report(const ReportOptions& options, Session& session) {
 }
 
 std::string write_report(const ReportOptions& options, Session& session, Report& report) {
-    const std::string out = options.out.empty() ? (fs::path(options.folder) / "report.html").string() : options.out;
+    const std::string out =
+        options.out.empty() ? (fs::path(options.folder) / "report.html").string() : options.out;
     report = make_report(options, session);
     write_file(out, report.html);
     return out;

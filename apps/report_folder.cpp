@@ -27,39 +27,38 @@ struct Expected {
 };
 
 const std::vector<Expected>& expected_files() {
-    static const std::vector<Expected> files{
-        {"density.vdb", {"map"}},
-        {"smooth.vdb", {"denoise"}},
-        {"slices_before_x.png", {"denoise"}},
-        {"slices_before_y.png", {"denoise"}},
-        {"slices_before_z.png", {"denoise"}},
-        {"slices_after_x.png", {"denoise"}},
-        {"slices_after_y.png", {"denoise"}},
-        {"slices_after_z.png", {"denoise"}},
-        {"spectra.svg", {"denoise"}},
-        {"density.svg", {"statistics"}},
-        {"isovalues.svg", {"statistics"}},
-        {"surface.ply", {"surface"}},
-        {"mesh.ply", {"remesh"}},
-        {"angles.svg", {"measure"}},
-        {"curved.ply", {"curvature"}},
-        {"curvature.svg", {"curvature"}},
-        {"k1k2.svg", {"curvature"}},
-        {"pockets.csv", {"pockets"}},
-        {"pockets.json", {"pockets"}},
-        {"pockets.ply", {"pockets"}},
-        {"tets.vtu", {"tets"}},
-        {"dihedrals.svg", {"tets"}},
-        {"map.png", {"pictures"}},
-        {"denoised.png", {"pictures", "denoise"}},
-        {"meshes.png", {"pictures", "remesh"}},
-        {"gaussian.png", {"pictures", "curvature"}},
-        {"mean.png", {"pictures", "curvature"}},
-        {"k1.png", {"pictures", "curvature"}},
-        {"k2.png", {"pictures", "curvature"}},
-        {"pockets_picture.png", {"pictures", "pockets"}},
-        {"cut.png", {"pictures", "tets"}},
-        {"peel.png", {"pictures", "tets"}}};
+    static const std::vector<Expected> files{{"density.vdb", {"map"}},
+                                             {"smooth.vdb", {"denoise"}},
+                                             {"slices_before_x.png", {"denoise"}},
+                                             {"slices_before_y.png", {"denoise"}},
+                                             {"slices_before_z.png", {"denoise"}},
+                                             {"slices_after_x.png", {"denoise"}},
+                                             {"slices_after_y.png", {"denoise"}},
+                                             {"slices_after_z.png", {"denoise"}},
+                                             {"spectra.svg", {"denoise"}},
+                                             {"density.svg", {"statistics"}},
+                                             {"isovalues.svg", {"statistics"}},
+                                             {"surface.ply", {"surface"}},
+                                             {"mesh.ply", {"remesh"}},
+                                             {"angles.svg", {"measure"}},
+                                             {"curved.ply", {"curvature"}},
+                                             {"curvature.svg", {"curvature"}},
+                                             {"k1k2.svg", {"curvature"}},
+                                             {"pockets.csv", {"pockets"}},
+                                             {"pockets.json", {"pockets"}},
+                                             {"pockets.ply", {"pockets"}},
+                                             {"tets.vtu", {"tets"}},
+                                             {"dihedrals.svg", {"tets"}},
+                                             {"map.png", {"pictures"}},
+                                             {"denoised.png", {"pictures", "denoise"}},
+                                             {"meshes.png", {"pictures", "remesh"}},
+                                             {"gaussian.png", {"pictures", "curvature"}},
+                                             {"mean.png", {"pictures", "curvature"}},
+                                             {"k1.png", {"pictures", "curvature"}},
+                                             {"k2.png", {"pictures", "curvature"}},
+                                             {"pockets_picture.png", {"pictures", "pockets"}},
+                                             {"cut.png", {"pictures", "tets"}},
+                                             {"peel.png", {"pictures", "tets"}}};
     return files;
 }
 
@@ -157,7 +156,8 @@ std::vector<PocketRow> pockets_of_csv(const std::string& text) {
             continue;
         }
         if (fields.size() != names.size())
-            throw InvalidInput(fmt::format("line {} has {} fields, not {}", number, fields.size(), names.size()));
+            throw InvalidInput(
+                fmt::format("line {} has {} fields, not {}", number, fields.size(), names.size()));
         rows.emplace_back();
         for (std::size_t i = 0; i < fields.size(); ++i)
             if (const auto value = csv_number(fields[i])) rows.back().values.emplace_back(names[i], *value);
@@ -189,7 +189,9 @@ std::vector<PocketRow> pockets_of_json(const std::string& text) {
 Json parsed(const std::string& text) {
     bool too_deep = false;
     const Json json = Json::parse(
-        text, [&](int depth, Json::parse_event_t, Json&) { return !(too_deep = too_deep || depth > deepest); }, false);
+        text,
+        [&](int depth, Json::parse_event_t, Json&) { return !(too_deep = too_deep || depth > deepest); },
+        false);
     if (too_deep || json.is_discarded()) return {};
     return json;
 }
@@ -214,12 +216,13 @@ std::optional<double> number_in(const Json& result, const std::string& key) {
 ReportFolder::ReportFolder(const std::string& path) : path_(path) {
     std::error_code error;
     if (!fs::exists(path_, error)) throw IoError(path + ": there is no such folder");
-    if (!fs::is_directory(path_, error)) throw InvalidInput(path + ": is a file; a report is on the folder of a model");
-    const bool any = has("summary.json") || std::any_of(expected_files().begin(), expected_files().end(), [&](const Expected& e) {
-        return has(e.file);
-    });
+    if (!fs::is_directory(path_, error))
+        throw InvalidInput(path + ": is a file; a report is on the folder of a model");
+    const bool any = has("summary.json") || std::any_of(expected_files().begin(), expected_files().end(),
+                                                        [&](const Expected& e) { return has(e.file); });
     if (!any)
-        throw InvalidInput(path + ": nothing to report on: it has none of the files that vdbgeo model writes");
+        throw InvalidInput(path +
+                           ": nothing to report on: it has none of the files that vdbgeo model writes");
     read_summary();
 }
 
@@ -229,11 +232,11 @@ bool ReportFolder::has(const std::string& name) const {
 }
 
 void ReportFolder::read_summary() {
-    const auto text = taken<std::string>("summary.json", [](const std::string& path) { return read_whole(path); });
+    const auto text =
+        taken<std::string>("summary.json", [](const std::string& path) { return read_whole(path); });
     if (!text) return;
     const Json json = parsed(*text);
-    if (!json.is_object())
-        return note_damage("summary.json", "is not the JSON that vdbgeo model writes");
+    if (!json.is_object()) return note_damage("summary.json", "is not the JSON that vdbgeo model writes");
     summary_ = json;
     const auto stages = json.find("stages");
     if (stages == json.end() || !stages->is_array()) return;
@@ -258,11 +261,12 @@ std::optional<PagePng> ReportFolder::picture(const std::string& name, const std:
 }
 
 std::string ReportFolder::svg(const std::string& name) {
-    return taken<std::string>(name, [](const std::string& path) {
-               std::string text = read_whole(path);
-               if (!is_svg(text)) throw InvalidInput("is not an SVG drawing");
-               return text;
-           })
+    return taken<std::string>(name,
+                              [](const std::string& path) {
+                                  std::string text = read_whole(path);
+                                  if (!is_svg(text)) throw InvalidInput("is not an SVG drawing");
+                                  return text;
+                              })
         .value_or("");
 }
 
@@ -285,10 +289,11 @@ PageTerms ReportFolder::missing_files() const {
     std::string names;
     for (const Expected& e : expected_files()) {
         if (has(e.file)) continue;
-        const bool due = !has_summary() || std::all_of(e.stages.begin(), e.stages.end(), [&](const char* name) {
-            const RunStage* s = stage(name);
-            return s && s->done();
-        });
+        const bool due =
+            !has_summary() || std::all_of(e.stages.begin(), e.stages.end(), [&](const char* name) {
+                const RunStage* s = stage(name);
+                return s && s->done();
+            });
         if (due) names += (names.empty() ? "" : ", ") + std::string(e.file);
     }
     if (names.empty()) return {};
@@ -300,12 +305,15 @@ PageTerms ReportFolder::missing(bool within_run) const {
     for (const auto& [name, why] : damaged_) list.emplace_back(name, "Cannot be used: " + why + ".");
     const std::string status = text("status");
     if (!has_summary())
-        list.emplace_back("The run", "There is no summary of it (summary.json): it was stopped before its end, or the "
-                                     "folder was put together by hand. What is there is shown, without the commands and "
-                                     "numbers of the run.");
+        list.emplace_back("The run",
+                          "There is no summary of it (summary.json): it was stopped before its end, or the "
+                          "folder was put together by hand. What is there is shown, without the commands and "
+                          "numbers of the run.");
     else if ((status == "running" && !within_run) || status == "interrupted")
-        list.emplace_back("The run", status == "running" ? "It had not come to its end when this page was made, or it was killed."
-                                                         : "It was interrupted before its end.");
+        list.emplace_back("The run",
+                          status == "running"
+                              ? "It had not come to its end when this page was made, or it was killed."
+                              : "It was interrupted before its end.");
     else if (status == "failed")
         list.emplace_back("The run", "It failed; the stages that did are below.");
     for (const RunStage& s : stages_) {
@@ -315,7 +323,8 @@ PageTerms ReportFolder::missing(bool within_run) const {
         else if (s.status == "failed")
             list.emplace_back(s.title, "Failed" + (s.error.empty() ? std::string(".") : ": " + s.error));
         else
-            list.emplace_back(s.title, "Not done (" + s.status + ")" + (s.error.empty() ? "." : ": " + s.error));
+            list.emplace_back(s.title,
+                              "Not done (" + s.status + ")" + (s.error.empty() ? "." : ": " + s.error));
     }
     const PageTerms files = missing_files();
     list.insert(list.end(), files.begin(), files.end());

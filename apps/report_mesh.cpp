@@ -22,7 +22,8 @@ namespace vdbgeo::app {
 namespace {
 
 /// Values of the vertices that come first, in this order; the others follow by name, as the file has them.
-constexpr const char* first_properties[] = {"H", "K", "k1", "k2", "shape_index", "curvedness", "type", "pocket", "protrusion"};
+constexpr const char* first_properties[] = {"H",          "K",    "k1",     "k2",        "shape_index",
+                                            "curvedness", "type", "pocket", "protrusion"};
 constexpr int most_ids = 254;  ///< pockets with a colour: what a category can number
 
 bool is_id(const std::string& name) { return name == "pocket" || name == "protrusion"; }
@@ -49,8 +50,7 @@ PageProperty page_property(const MeshProperty& p) {
         }
         for (int id = 1; id <= std::min(most_ids, static_cast<int>(std::min(most, 1e6f))); ++id)
             page.classes.emplace_back(id, fmt::format("{} {}", p.name, id));
-        if (most > most_ids)
-            page.help += fmt::format(" The first {} have colours.", most_ids);
+        if (most > most_ids) page.help += fmt::format(" The first {} have colours.", most_ids);
     }
     return page;
 }
@@ -72,7 +72,8 @@ std::array<double, 3> parts_at(const TriMesh& mesh, const Triangle& t, const Vec
 float blended(const std::vector<float>& values, const Triangle& t, const std::array<double, 3>& parts) {
     double sum = 0, weight = 0;
     for (std::size_t k = 0; k < 3; ++k)
-        if (std::isfinite(values[t[k]])) sum += parts[k] * static_cast<double>(values[t[k]]), weight += parts[k];
+        if (std::isfinite(values[t[k]]))
+            sum += parts[k] * static_cast<double>(values[t[k]]), weight += parts[k];
     return weight > 0 ? static_cast<float>(sum / weight) : std::numeric_limits<float>::quiet_NaN();
 }
 
@@ -126,11 +127,13 @@ TriMesh PageSurface::reduced(std::uint64_t faces, std::vector<std::string>& rema
     }
     std::size_t left_out = 0;
     if (shown.triangles.size() > faces) shown = largest_pieces(shown, faces, left_out);
-    remarks.push_back(fmt::format("The surface shown is simplified from {} to {} triangles for this page; all "
-                                  "numbers are those of the full mesh.",
-                                  count_text(mesh_.triangles.size()), count_text(shown.triangles.size())));
+    remarks.push_back(
+        fmt::format("The surface shown is simplified from {} to {} triangles for this page; all "
+                    "numbers are those of the full mesh.",
+                    count_text(mesh_.triangles.size()), count_text(shown.triangles.size())));
     if (left_out > 0)
-        remarks.push_back(fmt::format("Its {} smallest pieces are left out of the view.", count_text(left_out)));
+        remarks.push_back(
+            fmt::format("Its {} smallest pieces are left out of the view.", count_text(left_out)));
     return shown;
 }
 
@@ -143,7 +146,8 @@ std::vector<PageProperty> PageSurface::carried(const TriMesh& shown) {
         const TriangleTree::Nearest at = tree_->nearest(shown.points[v].cast<double>());
         const Triangle& t = mesh_.triangles[at.face];
         const std::array<double, 3> parts = parts_at(mesh_, t, at.point);
-        const auto nearest = static_cast<std::size_t>(std::max_element(parts.begin(), parts.end()) - parts.begin());
+        const auto nearest =
+            static_cast<std::size_t>(std::max_element(parts.begin(), parts.end()) - parts.begin());
         for (std::size_t i = 0; i < properties.size(); ++i)
             properties[i].values[v] = properties[i].category ? properties_[i].values[t[nearest]]
                                                              : blended(properties_[i].values, t, parts);
@@ -170,12 +174,14 @@ namespace {
 
 PageProperty smallest_angles(const TetMesh& mesh) {
     const PropertyWords words = property_words("min_dihedral_deg");
-    PageProperty p{"min_dihedral_deg", words.name, words.unit, words.help, {}, words.colormap, false, {}, {{0, 70}}};
+    PageProperty p{"min_dihedral_deg", words.name, words.unit, words.help, {},
+                   words.colormap,     false,      {},         {{0, 70}}};
     p.values.resize(mesh.tets.size());
     parallel_for(mesh.tets.size(), 1024, [&](std::size_t i) {
         const Tetrahedron& t = mesh.tets[i];
         p.values[i] = static_cast<float>(
-            tet_shape(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], mesh.points[t[3]]).min_dihedral_deg);
+            tet_shape(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]], mesh.points[t[3]])
+                .min_dihedral_deg);
     });
     return p;
 }
@@ -185,7 +191,9 @@ std::optional<PageProperty> region_property(const TetMesh& mesh) {
     if (mesh.regions.empty()) return {};
     const auto [least, most] = std::minmax_element(mesh.regions.begin(), mesh.regions.end());
     if (*least == *most || *most > most_ids) return {};
-    PageProperty p{"region", "Region", "", "Parts of the specimen that the input told apart.", {}, "categorical", true, {}, {}};
+    PageProperty p{"region", "Region",      "",   "Parts of the specimen that the input told apart.",
+                   {},       "categorical", true, {},
+                   {}};
     p.values.assign(mesh.regions.begin(), mesh.regions.end());
     std::vector<bool> there(static_cast<std::size_t>(*most) + 1, false);
     for (const std::int32_t r : mesh.regions) there[static_cast<std::size_t>(r)] = true;
@@ -198,7 +206,9 @@ double mean_edge(const TetMesh& mesh) {
     double sum = 0;
     for (const Tetrahedron& t : mesh.tets)
         for (const auto& e : tet_edges)
-            sum += (mesh.points[t[static_cast<std::size_t>(e[0])]] - mesh.points[t[static_cast<std::size_t>(e[1])]]).norm();
+            sum += (mesh.points[t[static_cast<std::size_t>(e[0])]] -
+                    mesh.points[t[static_cast<std::size_t>(e[1])]])
+                       .norm();
     return sum / (6 * static_cast<double>(mesh.tets.size()));
 }
 
@@ -209,8 +219,7 @@ TetMesh PageTets::coarser(std::uint64_t tets, const Progress& progress) {
     constexpr double voxels_a_cell = 1.5;
     if (!boundary_) boundary_ = boundary_surface(mesh_);
     const auto wanted = static_cast<double>(tets);
-    if (side_A_ == 0)
-        side_A_ = mean_edge(mesh_) * std::sqrt(static_cast<double>(mesh_.tets.size()) / wanted);
+    if (side_A_ == 0) side_A_ = mean_edge(mesh_) * std::sqrt(static_cast<double>(mesh_.tets.size()) / wanted);
     for (int i = 0; i < most_tries; ++i) {
         const auto grid = mesh_level_set(*boundary_, side_A_ / voxels_a_cell);
         StuffingOptions options;
@@ -237,10 +246,11 @@ PageMesh PageTets::at_most(std::uint64_t tets, const Progress& progress) {
     const TetMesh shown = coarser(tets, progress);
     page.shown = shown.tets.size();
     page.json = packed_tets(shown, {smallest_angles(shown)}, mesh_.tets.size());
-    page.remarks.push_back(fmt::format(
-        "The tetrahedra shown are {} larger ones that fill the same body, made for this page in place of the {} of "
-        "the model; all numbers are those of the model.",
-        count_text(page.shown), count_text(mesh_.tets.size())));
+    page.remarks.push_back(
+        fmt::format("The tetrahedra shown are {} larger ones that fill the same body, made for this page in "
+                    "place of the {} of "
+                    "the model; all numbers are those of the model.",
+                    count_text(page.shown), count_text(mesh_.tets.size())));
     return page;
 }
 

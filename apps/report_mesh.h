@@ -16,16 +16,16 @@ namespace vdbgeo::app {
 
 /// A mesh as it goes into the page.
 struct PageMesh {
-    std::string json;          ///< empty: none
-    std::uint64_t shown = 0;   ///< faces or tetrahedra
+    std::string json;                  ///< empty: none
+    std::uint64_t shown = 0;           ///< faces or tetrahedra
     std::vector<std::string> remarks;  ///< what was done to it, for readers
 };
 
 /// A surface, in as many faces as a page may have.
 ///
-/// More are simplified away (simplify, after repair where the mesh is no oriented manifold). Where that leaves
-/// too many, because pieces end as tetrahedra, the smallest pieces are left out. Values are those of the full
-/// mesh: scalars blended over the nearest face, categories of the nearest vertex.
+/// More are simplified away (simplify, after repair where the mesh is no oriented manifold). Where that
+/// leaves too many, because pieces end as tetrahedra, the smallest pieces are left out. Values are those of
+/// the full mesh: scalars blended over the nearest face, categories of the nearest vertex.
 class PageSurface {
  public:
     explicit PageSurface(TriMesh mesh);

@@ -19,9 +19,9 @@ bool ends_with(const std::string& text, const std::string& ending) {
 /// The endings that tell a unit, the longer ones first.
 const std::vector<std::pair<std::string, std::string>>& unit_endings() {
     static const std::vector<std::pair<std::string, std::string>> endings{
-        {"_per_A2", "1/Å²"},   {"_per_A", "1/Å"},  {"_A3", "Å³"}, {"_A2", "Å²"},
-        {"_A", "Å"},           {"_deg", "°"},      {"_percent", "%"}, {"_bytes", "bytes"},
-        {"_seconds", "s"},     {"_voxels", "voxels"}};
+        {"_per_A2", "1/Å²"}, {"_per_A", "1/Å"},    {"_A3", "Å³"},     {"_A2", "Å²"},
+        {"_A", "Å"},         {"_deg", "°"},        {"_percent", "%"}, {"_bytes", "bytes"},
+        {"_seconds", "s"},   {"_voxels", "voxels"}};
     return endings;
 }
 
@@ -46,7 +46,8 @@ std::string list_text(const Json& list) {
     if (list.size() > most) {
         if (!numbers) return fmt::format("{} entries", list.size());
         double low = list[0].get<double>(), high = low;
-        for (const Json& v : list) low = std::min(low, v.get<double>()), high = std::max(high, v.get<double>());
+        for (const Json& v : list)
+            low = std::min(low, v.get<double>()), high = std::max(high, v.get<double>());
         return fmt::format("{} numbers from {} to {}", list.size(), number_text(low), number_text(high));
     }
     std::string text;
@@ -63,14 +64,17 @@ std::string lower_first(std::string text) {
 
 /// Names of files, and what the page tells elsewhere.
 bool is_told_elsewhere(const std::string& key) {
-    static const std::vector<std::string> keys{"file", "in", "out", "files", "preview", "warnings", "notes", "list", "listed"};
+    static const std::vector<std::string> keys{"file",     "in",    "out",  "files", "preview",
+                                               "warnings", "notes", "list", "listed"};
     return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
-void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above, const Json& object, int depth);
+void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above, const Json& object,
+              int depth);
 
 /// A long list of objects is told by its length.
-void add_row(std::vector<std::vector<std::string>>& rows, const KeyWords& words, const Json& value, int depth) {
+void add_row(std::vector<std::vector<std::string>>& rows, const KeyWords& words, const Json& value,
+             int depth) {
     constexpr int deepest = 4;
     constexpr std::size_t most_objects = 4;
     const bool objects = value.is_array() && !value.empty() && value[0].is_object();
@@ -85,10 +89,12 @@ void add_row(std::vector<std::vector<std::string>>& rows, const KeyWords& words,
     }
     // A length with nothing in it needs no unit, nor do words.
     const bool counted = value.is_number() || (value.is_array() && !objects);
-    rows.push_back({words.label, value.is_object() ? "…" : value_text(value), counted ? words.unit : "", words.help});
+    rows.push_back(
+        {words.label, value.is_object() ? "…" : value_text(value), counted ? words.unit : "", words.help});
 }
 
-void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above, const Json& object, int depth) {
+void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above, const Json& object,
+              int depth) {
     for (const auto& [key, value] : object.items()) {
         if (depth == 0 && is_told_elsewhere(key)) continue;
         KeyWords words = words_for(key);
@@ -97,7 +103,8 @@ void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above
             const bool statistic = words.unit.empty() && !above.unit.empty();
             words.label = above.label + ": " + lower_first(words.label);
             if (statistic) words.unit = above.unit;
-            if (words.help.empty() || statistic) words.help = above.help + (words.help.empty() || above.help.empty() ? "" : " ") + words.help;
+            if (words.help.empty() || statistic)
+                words.help = above.help + (words.help.empty() || above.help.empty() ? "" : " ") + words.help;
         }
         add_row(rows, words, value, depth);
     }
@@ -117,7 +124,8 @@ KeyWords words_for(const std::string& key) {
         }
     if (name == "bytes" || name == "seconds") words.unit = name == "bytes" ? "bytes" : "s";
     std::replace(name.begin(), name.end(), '_', ' ');
-    if (!name.empty() && name.size() > 2 && name[0] >= 'a' && name[0] <= 'z') name[0] = static_cast<char>(name[0] - 'a' + 'A');
+    if (!name.empty() && name.size() > 2 && name[0] >= 'a' && name[0] <= 'z')
+        name[0] = static_cast<char>(name[0] - 'a' + 'A');
     words.label = name;
     return words;
 }

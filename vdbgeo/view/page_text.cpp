@@ -8,7 +8,8 @@
 namespace vdbgeo {
 namespace {
 
-/// Bytes of the well-formed UTF-8 sequence (Unicode, table 3-7) at the start of `text`, 0 where there is none.
+/// Bytes of the well-formed UTF-8 sequence (Unicode, table 3-7) at the start of `text`, 0 where there is
+/// none.
 std::size_t sequence(std::string_view text) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char lead = byte(0);

@@ -81,10 +81,11 @@ std::string table_html(const PageTable& table, bool pockets = false) {
     html += "<div class=\"scroll\">\n" + table_part(table, table.id, table.caption, 0, shown, pockets) +
             "</div>\n";
     if (shown == all) return html;
-    return html + fmt::format("<details><summary>{} more</summary>\n{}<div class=\"scroll\">\n{}</div>\n"
-                              "</details>\n",
-                              all - shown, copy_button(table.id + "-more", "table"),
-                              table_part(table, table.id + "-more", "", shown, all, pockets));
+    return html + fmt::format(
+                      "<details><summary>{} more</summary>\n{}<div class=\"scroll\">\n{}</div>\n"
+                      "</details>\n",
+                      all - shown, copy_button(table.id + "-more", "table"),
+                      table_part(table, table.id + "-more", "", shown, all, pockets));
 }
 
 /// The SVG itself, with ids of its own so that they mean nothing else on the page; where it has more than
@@ -96,27 +97,30 @@ std::string svg_html(const std::string& svg, const std::string& title, std::size
     std::string own = svg.substr(svg.find("<svg"));
     const std::string prefix = fmt::format("plot{}-", number);
     for (const std::string mark : {" id=\"", "url(#"})
-        for (std::size_t at = 0; (at = own.find(mark, at)) != std::string::npos; at += mark.size() + prefix.size())
+        for (std::size_t at = 0; (at = own.find(mark, at)) != std::string::npos;
+             at += mark.size() + prefix.size())
             own.insert(at + mark.size(), prefix);
     return own;
 }
 
 std::string figure_html(const PageFigure& figure, const char* kind, std::size_t number) {
-    const std::string body = figure.svg.empty() ? image(figure.image) : svg_html(figure.svg, figure.title, number);
-    return fmt::format("<figure class=\"{}\">\n{}\n<figcaption><strong>{}.</strong> {}</figcaption>\n</figure>\n",
-                       kind, body, html_text(figure.title), html_text(figure.caption));
+    const std::string body =
+        figure.svg.empty() ? image(figure.image) : svg_html(figure.svg, figure.title, number);
+    return fmt::format(
+        "<figure class=\"{}\">\n{}\n<figcaption><strong>{}.</strong> {}</figcaption>\n</figure>\n", kind,
+        body, html_text(figure.title), html_text(figure.caption));
 }
 
 std::string comparison_html(const PageComparison& c) {
-    return fmt::format(
-        "<div class=\"compare\" data-axis=\"{}\">{}{}</div>\n", c.axis, image(c.before, "before"),
-                       image(c.after, "after"));
+    return fmt::format("<div class=\"compare\" data-axis=\"{}\">{}{}</div>\n", c.axis,
+                       image(c.before, "before"), image(c.after, "after"));
 }
 
 std::string stage_html(const PageStage& stage, std::size_t number) {
-    std::string html = fmt::format("<li>\n<h3>{} <span class=\"status {}\">{}</span>{}</h3>\n",
-                                   html_text(stage.title), html_text(stage.status), html_text(stage.status),
-                                   stage.time.empty() ? "" : " <span class=\"time\">" + html_text(stage.time) + "</span>");
+    std::string html =
+        fmt::format("<li>\n<h3>{} <span class=\"status {}\">{}</span>{}</h3>\n", html_text(stage.title),
+                    html_text(stage.status), html_text(stage.status),
+                    stage.time.empty() ? "" : " <span class=\"time\">" + html_text(stage.time) + "</span>");
     if (!stage.command.empty()) {
         const std::string id = fmt::format("command-{}", number);
         html += fmt::format("<pre id=\"{}\">{}</pre>\n", id, html_text(stage.command)) +
@@ -152,9 +156,9 @@ std::string vector_json(const Vec3d& v) {
 }
 
 std::string data_json(const ReportContent& c) {
-    std::string json = fmt::format(R"({{"version":1,"title":{},"unit":"Å","colormaps":{},"surface":{},"tets":{})",
-                                   json_string(c.title), colormaps_json(),
-                                   c.surface.empty() ? "null" : c.surface, c.tets.empty() ? "null" : c.tets);
+    std::string json = fmt::format(
+        R"({{"version":1,"title":{},"unit":"Å","colormaps":{},"surface":{},"tets":{})", json_string(c.title),
+        colormaps_json(), c.surface.empty() ? "null" : c.surface, c.tets.empty() ? "null" : c.tets);
     json += R"(,"pockets":[)";
     for (const PagePocket& p : c.pocket_places)
         json += fmt::format(R"({}{{"id":{},"centre":{},"opening":{},"radius":{}}})",
@@ -189,9 +193,12 @@ std::string specimen_html(const ReportContent& c) {
 
 std::string noise_html(const ReportContent& c) {
     if (c.comparisons.empty() && c.noise.empty()) return {};
-    std::string html = c.comparisons.empty() ? "" : paragraph(
-        "Sections through the middle of the map, before and after the removal of noise, in the same greys: "
-        "what is dense is bright. Edges should stay where they are while the speckle between them goes.");
+    std::string html = c.comparisons.empty() ? ""
+                                             : paragraph(
+                                                   "Sections through the middle of the map, before and after "
+                                                   "the removal of noise, in the same greys: "
+                                                   "what is dense is bright. Edges should stay where they "
+                                                   "are while the speckle between them goes.");
     for (const PageComparison& one : c.comparisons) html += comparison_html(one);
     for (std::size_t i = 0; i < c.noise.size(); ++i) html += figure_html(c.noise[i], "plot", 1000 + i);
     return html;
@@ -206,8 +213,8 @@ std::string figures_html(const std::vector<PageFigure>& figures, const char* kin
 std::string numbers_html(const ReportContent& c) {
     std::string html;
     for (const PageNumbers& n : c.numbers)
-        html += fmt::format("<h3>{}</h3>\n", html_text(n.title)) +
-                (n.text.empty() ? "" : paragraph(n.text)) + table_html(n.table);
+        html += fmt::format("<h3>{}</h3>\n", html_text(n.title)) + (n.text.empty() ? "" : paragraph(n.text)) +
+                table_html(n.table);
     if (!c.glossary.empty() && !html.empty())
         html += "<h3 id=\"glossary\">Words</h3>\n" + terms(c.glossary, "glossary");
     return html;
@@ -230,8 +237,8 @@ std::string with_links(const std::string& text) {
     if (at == std::string::npos) return html_text(text);
     const std::size_t end = std::min(text.find_first_of(" ,;)", at), text.size());
     const std::string doi = html_text(text.substr(at + 4, end - at - 4));
-    return html_text(text.substr(0, at)) + fmt::format("<a href=\"https://doi.org/{}\">doi:{}</a>", doi, doi) +
-           html_text(text.substr(end));
+    return html_text(text.substr(0, at)) +
+           fmt::format("<a href=\"https://doi.org/{}\">doi:{}</a>", doi, doi) + html_text(text.substr(end));
 }
 
 std::string cite_html(const ReportContent& c) {
@@ -247,7 +254,8 @@ std::string cite_html(const ReportContent& c) {
 
 std::vector<Section> sections_of(const ReportContent& c) {
     std::vector<Section> all{
-        {"summary", "Summary", paragraphs(c.summary) + (c.facts.empty() ? "" : terms(c.facts, "facts", "card"))},
+        {"summary", "Summary",
+         paragraphs(c.summary) + (c.facts.empty() ? "" : terms(c.facts, "facts", "card"))},
         {"specimen", "The specimen", specimen_html(c)},
         {"pockets", "Pockets", pockets_html(c)},
         {"noise", "Noise", noise_html(c)},
@@ -270,7 +278,8 @@ std::string report_html(const ReportContent& content) {
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
         "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta name=\"generator\" content=\"vdbgeo\">\n<title>{}</title>\n<link rel=\"icon\" href=\"data:,\">\n"
+        "<meta name=\"generator\" content=\"vdbgeo\">\n<title>{}</title>\n<link rel=\"icon\" "
+        "href=\"data:,\">\n"
         "<style>{}</style>\n</head>\n<body>\n<header class=\"top\">\n<h1>{}</h1>\n",
         policy, html_text(content.title), page_style(), html_text(content.title));
     if (!content.subtitle.empty()) html += paragraph(content.subtitle, "subtitle");
@@ -278,8 +287,9 @@ std::string report_html(const ReportContent& content) {
     for (const Section& s : sections) html += fmt::format("<a href=\"#{}\">{}</a>\n", s.id, s.title);
     html += "</nav>\n</header>\n<main>\n";
     for (const Section& s : sections)
-        html += fmt::format("<section id=\"{}\" aria-labelledby=\"{}-title\">\n<h2 id=\"{}-title\">{}</h2>\n{}</section>\n",
-                            s.id, s.id, s.id, s.title, s.html);
+        html += fmt::format(
+            "<section id=\"{}\" aria-labelledby=\"{}-title\">\n<h2 id=\"{}-title\">{}</h2>\n{}</section>\n",
+            s.id, s.id, s.id, s.title, s.html);
     html += "</main>\n";
     html += "<script type=\"application/json\" id=\"vdbgeo-data\">" + data_json(content) + "</script>\n";
     if (have_page()) html += fmt::format("<script>{}</script>\n", page_script());

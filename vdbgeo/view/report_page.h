@@ -24,8 +24,8 @@ struct PagePng {
 /// A plot or a picture with what there is to say of it.
 struct PageFigure {
     std::string title, caption;
-    std::string svg;     ///< the file's text; empty: none
-    PagePng image;       ///< shown where there is no SVG
+    std::string svg;  ///< the file's text; empty: none
+    PagePng image;    ///< shown where there is no SVG
 };
 
 struct PageColumn {

@@ -106,7 +106,7 @@ Drawing plot_curvature_plane(const CurvatureReport& r, const Theme& theme) {
     options.title = "Principal curvatures over the surface";
     options.x_label = "k1, the greater one (1/Å)";
     options.y_label = "k2, the smaller one (1/Å)";
-    options.width = 820;
+    options.width = 800;
     options.theme = theme;
     PlaneDensity density{plane.side, plane.area, plane.low, plane.high};
     for (double& area : density.values) area = plane.all > 0 ? 100 * area / plane.all : 0;

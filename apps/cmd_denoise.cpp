@@ -56,6 +56,7 @@ void DenoiseOptions::finish(Session& session) {
     check_plot_output(spectra);
     plots.check(!spectra.empty(), "--spectra");
     check_folder_of(slices);
+    check_folder_of(spectra);
     if (method == "bilateral") check_usage(BilateralOptions{blur, range.value_or(1)});
     if (method == "perona-malik") {
         if (!diffusion.orders.empty())

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "apps/command.h"
+#include "apps/density_plot.h"
 #include "apps/flags.h"
 #include "apps/plots.h"
 #include "apps/reports.h"
@@ -128,7 +129,8 @@ Json density_counts(const std::string& file, const MapFile& in, const std::optio
         session.warn(fmt::format("{}: {} voxels are no finite number: left out", file, h.non_finite));
     if (level && !(level->isovalue >= h.low && level->isovalue <= h.high))
         session.warn(fmt::format("{}: no density is near the isovalue {:.6g}", file, level->isovalue));
-    write_drawing(plot_densities(h, file, level, options.plots.theme()), options.histogram);
+    const auto drawing = plot_densities(h, file, in.level_set, level, options.plots.theme());
+    write_drawing(drawing, options.histogram);
     return {{"low", h.low}, {"high", h.high}, {"voxels", h.voxels}, {"counts", h.counts}};
 }
 
@@ -170,6 +172,7 @@ void check_info(const InfoOptions& options) {
 
 void run_info(const InfoOptions& options, Session& session) {
     check_info(options);
+    for (const std::string& path : {options.plot, options.histogram}) check_folder_of(path);
     for (const std::string& file : options.files)
         if (file == "-" && options.validate)
             throw UsageError("-: --validate reads a file more than once, which a pipe does not allow");

@@ -47,6 +47,7 @@ Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures&
 void run_measure(const MeasureOptions& o, Session& session) {
     check_plot_output(o.histogram);
     o.plots.check(!o.histogram.empty(), "--histogram");
+    check_folder_of(o.histogram);
     if (!o.distance.empty() && o.in.size() > 1) throw UsageError("--distance is that of one mesh to another");
     Json all = Json::array();
     std::vector<std::pair<std::string, MeshMeasures>> meshes;

@@ -137,7 +137,7 @@ Command model_command() {
         "model",
         "The whole protocol on a map: grid, noise, surface, curvature, pockets, tetrahedra, pictures, report",
         "  vdbgeo model emd_1080.map -o groel --iso 0.8\n"
-        "  vdbgeo model tomogram.rec -o tomo --preset tomogram --invert --bin 2\n"
+        "  vdbgeo model tomogram.rec -o tomo --preset tomogram --iso 1.5sigma\n"
         "  vdbgeo model emd_1080.map -o groel --iso 0.8 --set remesh.length=3 --set tets.method=cgal\n"
         "  vdbgeo model other.map -o other --config groel/summary.json",
         [](CLI::App& app) {

@@ -14,7 +14,12 @@
 namespace vdbgeo::app {
 namespace {
 
-constexpr std::size_t bins = 120, cells = 104;
+constexpr std::size_t bins = 120;
+
+/// Cells a side of the plane: four vertices a cell, were they even; else many would hold one or none.
+std::size_t cells_for(std::size_t vertices) {
+    return static_cast<std::size_t>(std::clamp(std::sqrt(static_cast<double>(vertices) / 4), 24.0, 104.0));
+}
 
 /// The area by value, in equal bins from low to high; what lies beyond is left out.
 std::vector<double> area_in_bins(const Array<double>& values, const Array<double>& areas, double low,
@@ -101,12 +106,13 @@ Drawing plot_curvature_histogram(const CurvatureReport& r, const Theme& theme) {
 }
 
 Drawing plot_curvature_plane(const CurvatureReport& r, const Theme& theme) {
-    const CurvaturePlane plane = curvature_plane(r.curvature, as_weights(r.areas), cells);
+    const CurvaturePlane plane =
+        curvature_plane(r.curvature, as_weights(r.areas), cells_for(r.curvature.size()));
     PlotOptions options;
     options.title = "Principal curvatures over the surface";
     options.x_label = "k1, the greater one (1/Å)";
     options.y_label = "k2, the smaller one (1/Å)";
-    options.width = 820;
+    options.width = 800;
     options.theme = theme;
     PlaneDensity density{plane.side, plane.area, plane.low, plane.high};
     for (double& area : density.values) area = plane.all > 0 ? 100 * area / plane.all : 0;

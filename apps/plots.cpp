@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <cmath>
 
 #include "apps/session.h"
 #include "apps/stages.h"
-#include "vdbgeo/view/plot.h"
 #include "vdbgeo/view/png.h"
 #include "vdbgeo/view/svg.h"
 
@@ -36,19 +35,6 @@ MarkedLevel marked_level(double isovalue, const Statistics& statistics) {
     const double sigmas = (isovalue - statistics.mean) / statistics.rms;
     return {isovalue, fmt::format("isovalue {:.4g} (mean {} {:.3g}σ)", isovalue, sigmas < 0 ? "−" : "+",
                                   std::abs(sigmas))};
-}
-
-Drawing plot_densities(const DensityHistogram& histogram, const std::string& name,
-                       const std::optional<MarkedLevel>& level, const Theme& theme) {
-    PlotOptions options;
-    options.title = fmt::format("Densities of {}", std::filesystem::path(name).filename().string());
-    options.x_label = "density (the map's units)";
-    options.y_label = "voxels a bin";
-    options.logarithmic_counts = true;
-    options.theme = theme;
-    if (level) options.marks = {{level->isovalue, level->label}};
-    return plot_histogram({histogram.counts.begin(), histogram.counts.end()}, histogram.low, histogram.high,
-                          options);
 }
 
 }  // namespace vdbgeo::app

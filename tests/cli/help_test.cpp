@@ -118,6 +118,8 @@ TEST_F(Help, OfEachCommandHasAnExampleUnitsAndDefaults) {
 // The examples as they stand, in a folder that has their files: maps and meshes made for the purpose.
 TEST_F(Help, ExamplesRun) {
     phantom("emd_1080.map", 24);
+    phantom("other.map", 24, {}, "torus");
+    phantom("tomogram.rec", 32, {"--snr", "5"}, "atpase");
     good({"surface", at("emd_1080.map"), at("groel.ply"), "--iso", "0.8"});
     vdbgeo::write_tets(ball_tets(10, 3), at("groel.vtu"));
     RunOptions here;

@@ -62,6 +62,22 @@ TEST(DensityHistogram, WholeNumbersLieInTheMiddleOfTheirBins) {
     EXPECT_EQ(few.counts, (std::vector<std::uint64_t>{samples * 3 / 7, samples * 3 / 7, samples / 7}));
 }
 
+TEST(DensityHistogram, ScaledBytesFillTheirBinsEvenly) {
+    std::vector<float> values(samples);
+    for (std::size_t i = 0; i < samples; ++i)
+        values[i] = 0.0055899792f * static_cast<float>(static_cast<int>(i % 247) - 100) + 0.19921453f;
+    const DensityMap map = map_from_values(n, values);
+    const DensityHistogram h = density_histogram(map, 220);  // 247 levels: two a bin
+    ASSERT_EQ(h.counts.size(), 124u);
+    for (std::size_t i = 0; i < 123; ++i) EXPECT_EQ(h.counts[i], 2 * samples / 247) << i;
+    EXPECT_EQ(h.counts[123], samples / 247);
+    EXPECT_NEAR(h.low, values[0] - 0.0028, 1e-4);
+    // One value that fits in nowhere: no steps.
+    std::vector<float> torn = values;
+    torn[0] = 0.2012f;
+    EXPECT_EQ(density_histogram(map_from_values(n, torn), 220).counts.size(), 220u);
+}
+
 TEST(DensityHistogram, OfOneValueAndOfNone) {
     const DensityHistogram one = density_histogram(map_from_values(n, std::vector<float>(samples, 0.3f)), 9);
     EXPECT_EQ(one.counts, std::vector<std::uint64_t>{samples});

@@ -190,7 +190,7 @@ PlotFrame square_frame(const PlaneDensity& density, const PlotOptions& options, 
     ys = linear_ticks(frame, em);
     finish_frame(frame, ys, options, em);
     frame.left = std::round(frame.left);
-    const double room = std::min(options.width - 9 * em - frame.left, frame.height());
+    const double room = std::min(options.width - 8 * em - frame.left, frame.height());
     frame.top = std::round(frame.top);
     const double side = std::max(20.0, std::floor(room));
     frame.right = frame.left + side;
@@ -206,7 +206,8 @@ Drawing plot_plane(const PlaneDensity& density, const PlanePlot& plane, const Pl
     options.check();
     check_plane(density, plane);
     Drawing drawing = empty_drawing(options);
-    const double em = em_of(options);
+    // A square leaves less of the width than other plots have: the words go by the height too.
+    const double em = std::max(10.0, std::min(options.width / 36.0, options.height / 30.0));
     Ticks xs, ys;
     const PlotFrame frame = square_frame(density, options, em, xs, ys);
     const double greatest = *std::max_element(density.values.begin(), density.values.end());

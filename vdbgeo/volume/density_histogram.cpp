@@ -15,10 +15,59 @@ namespace {
 constexpr std::size_t leaves_together = 1024;
 /// Above it neighbouring whole numbers are no longer told apart by floats.
 constexpr float largest_whole = 16777216;
+/// Maps of more values than this have no steps that a histogram would show, but for those of whole numbers.
+constexpr std::size_t most_values = 1024;
+
+/// The different values that occur, in their order, as long as they are few.
+class FewValues {
+ public:
+    void add(float value) {
+        if (too_many_ || (!values_.empty() && value == last_)) return;
+        last_ = value;
+        const auto at = std::lower_bound(values_.begin(), values_.end(), value);
+        if (at != values_.end() && *at == value) return;
+        values_.insert(at, value);
+        if (values_.size() > most_values) forget();
+    }
+    void join(const FewValues& other) {
+        for (const float value : other.values_) add(value);
+        if (other.too_many_) forget();
+    }
+    /// The number of which all differences are multiples, to the rounding of floats; 0 where there is none.
+    double step() const {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 1; i < values_.size(); ++i)
+            least = std::min(least, double(values_[i]) - double(values_[i - 1]));
+        if (too_many_ || values_.size() < 2) return 0;
+        // The least difference is rounded, and that adds up: the whole range tells it better.
+        const double range = double(values_.back()) - double(values_.front());
+        const double steps = std::round(range / least);
+        if (steps > largest_whole) return 0;
+        const double step = range / steps;
+        const double rounding =
+            2e-7 * std::max(std::abs(double(values_.front())), std::abs(double(values_.back())));
+        for (const float value : values_) {
+            const double at = (double(value) - double(values_.front())) / step;
+            if (std::abs(at - std::round(at)) > 0.01 + rounding / step) return 0;
+        }
+        return rounding < 0.25 * step ? step : 0;
+    }
+
+ private:
+    void forget() {
+        too_many_ = true;
+        values_.clear();
+    }
+
+    std::vector<float> values_;
+    float last_ = 0;
+    bool too_many_ = false;
+};
 
 struct Range {
     float low = std::numeric_limits<float>::infinity(), high = -low;
     bool whole = true;
+    FewValues values;
     std::uint64_t finite = 0, other = 0;
 
     void add(float value, std::uint64_t n) {
@@ -30,11 +79,13 @@ struct Range {
         low = std::min(low, value);
         high = std::max(high, value);
         whole = whole && value == std::floor(value) && std::abs(value) <= largest_whole;
+        values.add(value);
     }
     void join(const Range& r) {
         low = std::min(low, r.low);
         high = std::max(high, r.high);
         whole = whole && r.whole;
+        values.join(r.values);
         finite += r.finite;
         other += r.other;
     }
@@ -86,11 +137,12 @@ DensityHistogram density_histogram(const DensityMap& map, std::size_t bins, cons
     h.high = range.high;
     h.voxels = range.finite;
     h.non_finite = range.other;
-    if (range.whole) {
-        const double width = std::ceil((h.high - h.low + 1) / static_cast<double>(bins));
-        bins = static_cast<std::size_t>(std::ceil((h.high - h.low + 1) / width));
-        h.low -= 0.5;
-        h.high = h.low + width * static_cast<double>(bins);
+    if (const double step = range.whole ? 1 : range.values.step(); step > 0) {
+        const double levels = std::round((h.high - h.low) / step) + 1;
+        const double together = std::ceil(levels / static_cast<double>(bins));
+        bins = static_cast<std::size_t>(std::ceil(levels / together));
+        h.low -= step / 2;
+        h.high = h.low + together * step * static_cast<double>(bins);
     } else if (!(h.low < h.high)) {
         const double half = std::max(0.5 * std::abs(h.low), double(std::numeric_limits<float>::min()));
         bins = 1;

@@ -27,7 +27,7 @@ struct ModelFlags {
     MapFlags map;
     IsoFlag iso;
     VdbWriteOptions vdb;
-    RenderOptions render;
+    std::string width, view, occlusion;
     std::vector<PassedOn> passed_on;
 };
 
@@ -127,7 +127,12 @@ void add_flags(CLI::App& app, ModelFlags& flags) {
         flags.map.add_sparsify(app);
         add_vdb_flags(app, flags.vdb);
     });
-    pass_on(app, flags, "pictures", [&] { add_render_flags(app, flags.render); });
+    pass_on(app, flags, "pictures", [&] {
+        app.add_option("--width", flags.width, "Width of the pictures in pixels [1200]");
+        app.add_option("--view", flags.view, "Of the pictures: three, front, side, top, iso, or x,y,z");
+        app.add_option("--occlusion", flags.occlusion,
+                       "Rays of ambient occlusion in the pictures, 0 to 1024");
+    });
 }
 
 }  // namespace

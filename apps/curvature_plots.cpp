@@ -14,7 +14,9 @@
 namespace vdbgeo::app {
 namespace {
 
-constexpr std::size_t bins = 120;
+/// Bins of a histogram: 150 vertices a bin, were they even; with fewer a curve shows their number, not the
+/// shape.
+std::size_t bins_for(std::size_t vertices) { return std::clamp<std::size_t>(vertices / 150, 30, 120); }
 
 /// Cells a side of the plane: four vertices a cell, were they even; else many would hold one or none.
 std::size_t cells_for(std::size_t vertices) {
@@ -22,13 +24,13 @@ std::size_t cells_for(std::size_t vertices) {
 }
 
 /// The area by value, in equal bins from low to high; what lies beyond is left out.
-std::vector<double> area_in_bins(const Array<double>& values, const Array<double>& areas, double low,
-                                 double high) {
+std::vector<double> area_in_bins(const Array<double>& values, const Array<double>& areas, std::size_t bins,
+                                 double low, double high) {
     std::vector<double> area(bins, 0.0);
     for (std::size_t v = 0; v < values.size(); ++v)
         if (values[v] >= low && values[v] < high)
-            area[std::min(bins - 1, static_cast<std::size_t>((values[v] - low) / (high - low) * bins))] +=
-                areas[v];
+            area[std::min(bins - 1, static_cast<std::size_t>((values[v] - low) / (high - low) *
+                                                             static_cast<double>(bins)))] += areas[v];
     return area;
 }
 
@@ -79,8 +81,9 @@ Drawing plot_curvature_histogram(const CurvatureReport& r, const Theme& theme) {
     options.y_label = "share of the area (% a bin)";
     options.theme = theme;
     const Curvatures& c = r.curvature;
+    const std::size_t bins = bins_for(c.size());
     const Array<double> weights = as_weights(r.areas);
-    // One axis for the three: from the least to the greatest of what 98 % of the area has.
+    // One axis for the three: from the least to the greatest of what 99 % of the area has.
     double low = 0, high = 0;
     for (const Array<double>* values : {&c.k1, &c.k2}) {
         const AreaHistogram h = area_histogram(*values, weights, bins);
@@ -92,12 +95,13 @@ Drawing plot_curvature_histogram(const CurvatureReport& r, const Theme& theme) {
     std::vector<Curve> curves;
     const std::pair<const char*, const Array<double>*> shown[] = {{"k1", &c.k1}, {"k2", &c.k2}, {"H", &c.H}};
     for (const auto& [name, values] : shown) {
-        const std::vector<double> area = area_in_bins(*values, weights, low, high);
+        const std::vector<double> area = area_in_bins(*values, weights, bins, low, high);
         double all = 0;
         for (const double a : area) all += a;
         Curve curve{name, {}, {}, colours.category(static_cast<std::int64_t>(curves.size()))};
         for (std::size_t b = 0; b < bins; ++b) {
-            curve.x.push_back(low + (static_cast<double>(b) + 0.5) * (high - low) / bins);
+            curve.x.push_back(low +
+                              (static_cast<double>(b) + 0.5) * (high - low) / static_cast<double>(bins));
             curve.y.push_back(all > 0 ? 100 * area[b] / all : 0);
         }
         curves.push_back(std::move(curve));

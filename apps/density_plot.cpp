@@ -15,7 +15,7 @@ Drawing plot_densities(const DensityHistogram& histogram, const std::string& nam
                                 std::filesystem::path(name).filename().string());
     options.x_label = distances ? "distance from the surface (Å)" : "density (the map's units)";
     options.y_label = "voxels a bin";
-    options.logarithmic_counts = true;
+    options.logarithmic_counts = !distances;
     options.theme = theme;
     if (level) options.marks = {{level->isovalue, level->label}};
     return plot_histogram({histogram.counts.begin(), histogram.counts.end()}, histogram.low, histogram.high,

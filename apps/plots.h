@@ -1,14 +1,13 @@
-// Plots as files: what their names may be, how they look, and those that several commands draw.
+// Plots as files: what their names may be, how they look, and the isovalue that they mark.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
-#include <optional>
 #include <string>
 
 #include "vdbgeo/view/drawing.h"
 #include "vdbgeo/view/theme.h"
-#include "vdbgeo/volume/density_histogram.h"
+#include "vdbgeo/volume/density_map.h"
 
 namespace vdbgeo::app {
 
@@ -33,10 +32,6 @@ struct MarkedLevel {
     double isovalue = 0;
     std::string label;  ///< "isovalue 0.12 (mean + 3σ)"
 };
-
-/// The densities of a map, counted logarithmically; the isovalue marked where there is one.
-Drawing plot_densities(const DensityHistogram& histogram, const std::string& name,
-                       const std::optional<MarkedLevel>& level, const Theme& theme);
 
 /// The label that names an isovalue and its distance from the mean in standard deviations.
 MarkedLevel marked_level(double isovalue, const Statistics& statistics);

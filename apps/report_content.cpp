@@ -12,7 +12,6 @@
 #include "converters/tet_file.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/measure/mesh_measures.h"
-#include "vdbgeo/view/page_assets.h"
 #include "vdbgeo/view/report_page.h"
 
 namespace vdbgeo::app {
@@ -21,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t pockets_shown = 50;
+const std::string no_break = "\u00A0";
 
 const char* plural(std::uint64_t n, const char* one, const char* more) { return n == 1 ? one : more; }
 
@@ -130,8 +130,8 @@ PageTerms facts_terms(const Facts& f, std::size_t pockets) {
     if (!f.size.empty()) terms.emplace_back("Size", f.size + " voxels");
     if (!f.voxel.empty()) terms.emplace_back("Voxel", voxel_text(f.voxel));
     if (f.isovalue) terms.emplace_back("Isovalue", number_text(*f.isovalue));
-    if (f.volume_A3) terms.emplace_back("Volume", volume_text(*f.volume_A3));
-    if (f.area_A2) terms.emplace_back("Area", number_text(*f.area_A2) + " Å²");
+    if (f.volume_A3) terms.emplace_back("Volume", number_text(*f.volume_A3) + no_break + "Å³");
+    if (f.area_A2) terms.emplace_back("Area", number_text(*f.area_A2) + no_break + "Å²");
     if (f.pieces) terms.emplace_back("Pieces", number_text(*f.pieces));
     if (pockets > 0) terms.emplace_back("Pockets", count_text(pockets));
     if (f.tets) terms.emplace_back("Tetrahedra", number_text(*f.tets));
@@ -147,9 +147,12 @@ std::string opening_text(const PocketRow& row) {
     return text;
 }
 
+/// Lengths and areas to a tenth of an Å or Å², so that columns line up; others with four digits.
 std::string cell(const PocketRow& row, const std::string& column) {
     const auto value = row.number(column);
-    return value ? number_text(*value) : "–";
+    if (!value) return "–";
+    const bool per = column.find("_per_") != std::string::npos || column.rfind("mean_", 0) == 0;
+    return per ? number_text(*value) : decimal_text(*value, 1);
 }
 
 /// Means over the patch of values that were sampled, by the names of their columns.
@@ -177,11 +180,8 @@ void add_pockets(ReportContent& c, const std::vector<PocketRow>& rows) {
                   "rolls over it; the mouth is the opening. Curvatures are means over the patch, negative "
                   "where the "
                   "surface is hollow; the position is that of its middle in the map's frame.");
-    if (have_page() && !c.surface.empty())
-        c.pockets_text.push_back("Choose a row to see the pocket in the view above.");
     c.pockets.id = "pocket-table";
     c.pockets.shown = pockets_shown;
-    c.pockets.caption = outward ? "Protrusions by rank" : "Pockets by rank";
     c.pockets.columns = {{"Rank"},          {"Area (Å²)"}, {"Depth (Å)"}, {"Mouth (Å²)"}, {"Mean k1 (1/Å)"},
                          {"Mean k2 (1/Å)"}, {"x (Å)"},     {"y (Å)"},     {"z (Å)"},      {"Form", false}};
     const std::vector<std::string> sampled = sampled_columns(rows);
@@ -296,9 +296,7 @@ PageTable settings_table(const char* id, const char* caption, const Json& object
     return table;
 }
 
-std::string status_word(const RunStage& s) {
-    return s.status == "off" ? "off" : s.status.empty() ? "unknown" : s.status;
-}
+std::string status_word(const RunStage& s) { return s.status == "done" ? "" : s.status; }
 
 void add_how(ReportContent& c, const ReportFolder& folder) {
     const Json& summary = folder.summary();
@@ -451,9 +449,6 @@ class ReportMaker {
         content_.pocket_places =
             content_.surface.empty() ? std::vector<PagePocket>() : pocket_places(pockets_);
         content_.specimen.clear();
-        if (have_page() && !(content_.surface.empty() && content_.tets.empty()))
-            content_.specimen.push_back(
-                "Drag to turn, scroll to come closer; choose colours and cuts beside the picture.");
         for (const PageMesh* m : {&meshes_.shown_surface, &meshes_.shown_tets})
             content_.specimen.insert(content_.specimen.end(), m->remarks.begin(), m->remarks.end());
         content_.specimen.insert(content_.specimen.end(), left_out_.begin(), left_out_.end());

@@ -199,7 +199,7 @@ const Words& pocket_words() {
         {"depth_below",
          {"Depth is measured below", "",
           "The convex hull (a sheet tight around the specimen), or a ball that rolls over it."}},
-        {"ambient_radius_A", {"Radius of the ball", "Å", "– where depth is measured from the hull."}},
+        {"ambient_radius_A", {"Radius of the ball", "Å", "Not given where depth is measured from the hull."}},
         {"pockets", {"Pockets", "", "Patches found."}},
         {"protrusions", {"Protrusions", "", "Patches found."}},
         {"surface_area_A2", {"Area of the whole surface", "Å²", ""}}};

@@ -64,8 +64,8 @@ std::string lower_first(std::string text) {
 
 /// Names of files, and what the page tells elsewhere.
 bool is_told_elsewhere(const std::string& key) {
-    static const std::vector<std::string> keys{"file",     "in",    "out",  "files", "preview",
-                                               "warnings", "notes", "list", "listed"};
+    static const std::vector<std::string> keys{"name",    "file",     "in",    "out",  "files",
+                                               "preview", "warnings", "notes", "list", "listed"};
     return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
@@ -98,13 +98,16 @@ void add_rows(std::vector<std::vector<std::string>>& rows, const KeyWords& above
     for (const auto& [key, value] : object.items()) {
         if (depth == 0 && is_told_elsewhere(key)) continue;
         KeyWords words = words_for(key);
+        if (above.label == words_for("seconds").label) words = {words.label, above.unit, ""};
         if (!above.label.empty()) {
             // Of "H_per_A": {"mean": …} the unit and the meaning stand above.
             const bool statistic = words.unit.empty() && !above.unit.empty();
             words.label = above.label + ": " + lower_first(words.label);
             if (statistic) words.unit = above.unit;
-            if (words.help.empty() || statistic)
-                words.help = above.help + (words.help.empty() || above.help.empty() ? "" : " ") + words.help;
+            if (words.help.empty())
+                words.help = above.help;
+            else if (statistic && !above.help.empty())
+                words.help = above.help + " " + words.help;
         }
         add_row(rows, words, value, depth);
     }
@@ -151,6 +154,13 @@ std::string number_text(double value) {
         if (digits.back() == '.') digits.pop_back();
     }
     return grouped(digits);
+}
+
+std::string decimal_text(double value, int digits) {
+    if (!(std::abs(value) < 1e15)) return number_text(value);
+    const std::string text = fmt::format("{:.{}f}", value, digits);
+    const bool nothing = text.find_first_not_of("-0.") == std::string::npos;  // −0.0
+    return nothing && text[0] == '-' ? text.substr(1) : grouped(text);
 }
 
 std::string value_text(const Json& value) {

@@ -20,6 +20,8 @@ KeyWords words_for(const std::string& key);
 /// A number for people: as many digits as mean something, thousands apart, powers of ten where it is very
 /// small or very large. Whole numbers are told whole.
 std::string number_text(double value);
+/// With so many digits behind the point, however many before it.
+std::string decimal_text(double value, int digits);
 std::string count_text(std::uint64_t count);
 
 /// A JSON value as text in a table: numbers as number_text, yes and no, lists one behind the other or, long

@@ -82,7 +82,7 @@ TEST(CurvaturePlane, ATorusHasOneK1AndARangeOfK2) {
             if (y > c.plane.cell(0.25, 0) / side) convex += area;
         }
     EXPECT_GT(in_column / c.plane.all, 0.97);
-    // The outer half of the torus: 2π ring · π tube + 4π tube² of twice that without the sum's second part.
+    // The outer half has the area 2π² ring tube + 4π tube², the whole 4π² ring tube.
     const double half = 2 * M_PI * M_PI * 12 * 4, more = 4 * M_PI * 16;
     EXPECT_NEAR(convex / c.plane.all, (half + more) / (2 * half), 0.06);
 }

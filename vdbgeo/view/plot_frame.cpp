@@ -22,7 +22,7 @@ void PlotOptions::check() const {
 }
 
 double em_of(const PlotOptions& options) {
-    return std::max(10.0, std::min(options.width / 46.0, options.height / 24.0));
+    return std::max(10.0, std::min(options.width / 42.0, options.height / 24.0));
 }
 
 Drawing empty_drawing(const PlotOptions& options) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "vdbgeo/view/colormap.h"
 #include "vdbgeo/view/page_assets.h"
@@ -117,10 +118,11 @@ std::string comparison_html(const PageComparison& c) {
 }
 
 std::string stage_html(const PageStage& stage, std::size_t number) {
-    std::string html =
-        fmt::format("<li>\n<h3>{} <span class=\"status {}\">{}</span>{}</h3>\n", html_text(stage.title),
-                    html_text(stage.status), html_text(stage.status),
-                    stage.time.empty() ? "" : " <span class=\"time\">" + html_text(stage.time) + "</span>");
+    std::string html = "<li>\n<h3>" + html_text(stage.title);
+    const std::string apart = stage.status.empty() || stage.time.empty() ? "" : ", ";
+    if (!stage.status.empty() || !stage.time.empty())
+        html += " <small>" + html_text(stage.status) + apart + html_text(stage.time) + "</small>";
+    html += "</h3>\n";
     if (!stage.command.empty()) {
         const std::string id = fmt::format("command-{}", number);
         html += fmt::format("<pre id=\"{}\">{}</pre>\n", id, html_text(stage.command)) +
@@ -174,6 +176,8 @@ struct Section {
 
 std::string pockets_html(const ReportContent& c) {
     std::string html = paragraphs(c.pockets_text);
+    if (have_page() && !c.surface.empty() && !c.pocket_places.empty())
+        html += paragraph("Choose a row to see the pocket in the view above.", "hint");
     if (!c.pockets.rows.empty()) html += table_html(c.pockets, true);
     return html;
 }
@@ -225,9 +229,11 @@ std::string how_html(const ReportContent& c) {
     if (!c.how.empty()) html += "<ol class=\"stages\">\n";
     for (std::size_t i = 0; i < c.how.size(); ++i) html += stage_html(c.how[i], i + 1);
     if (!c.how.empty()) html += "</ol>\n";
-    for (const PageTable& table : c.how_tables)
-        html += fmt::format("<details>\n<summary>{}</summary>\n", html_text(table.caption)) +
-                table_html(table) + "</details>\n";
+    for (PageTable table : c.how_tables) {
+        const std::string caption = std::exchange(table.caption, "");
+        html +=
+            "<details>\n<summary>" + html_text(caption) + "</summary>\n" + table_html(table) + "</details>\n";
+    }
     return html;
 }
 

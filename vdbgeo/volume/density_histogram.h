@@ -19,10 +19,11 @@ struct DensityHistogram {
 };
 
 /// Of the active voxels: all samples of a map file, what was kept of a sparse one. From the least to the
-/// greatest density in `bins` equal bins; where all are whole numbers (maps of integers) the bins are a whole
-/// number wide, `bins` at most, with the numbers in their middle: else some would hold one number more than
-/// their neighbours. One value alone has a bin to itself. Without any voxel InvalidInput, so for 0 bins;
-/// Cancelled. The same for any number of threads. Cost: two passes.
+/// greatest density in `bins` equal bins; where the densities are levels with one distance between them (maps
+/// of integers, scaled or not; up to 1024 levels, whole numbers any) a bin holds a whole number of levels,
+/// `bins` at most, with the levels in the middle of their part: else some bins would hold one level more than
+/// their neighbours. One value alone has a bin to itself. Errors: InvalidInput without any voxel and for 0
+/// bins; Cancelled. The same for any number of threads. Cost: two passes.
 DensityHistogram density_histogram(const DensityMap& map, std::size_t bins, const Progress& progress = {});
 
 }  // namespace vdbgeo

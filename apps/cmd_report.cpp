@@ -28,7 +28,7 @@ void run_report(const ReportOptions& o, Session& session) {
     if (!have_page()) session.warn("this build has no script for the page: nothing in it can be turned");
     for (const std::string& note : report.notes) session.say(note);
     session.say(fmt::format("{}: {:.2f} MB", out == "-" ? "page" : out,
-                            static_cast<double>(report.html.size()) / (1 << 20)));
+                            static_cast<double>(report.html.size()) / 1e6));
     session.result({{"out", out},
                     {"bytes", report.html.size()},
                     {"faces", report.faces},
@@ -48,7 +48,7 @@ Command report_command() {
     return {"report", "One HTML page with the model, plots, pictures and numbers of a folder that model made",
             "  vdbgeo report groel --title GroEL", [](CLI::App& app) {
                 auto o = std::make_shared<ReportOptions>();
-                auto size = std::make_shared<std::string>("10M");
+                auto size = std::make_shared<std::string>();
                 app.add_option("folder", o->folder, "Folder of a model run, finished or not")->required();
                 app.add_option("-o,--out", o->out,
                                "Page to write, - for standard output [report.html in the folder]");
@@ -57,11 +57,11 @@ Command report_command() {
                     ->capture_default_str();
                 app.add_option("--tets", o->tets, "Fill it for the page with at most this many tetrahedra")
                     ->capture_default_str();
-                app.add_option("--max-size", *size,
-                               "Size of the page in bytes, such as 10M: what does not fit is made coarser")
-                    ->capture_default_str();
+                app.add_option(
+                    "--max-size", *size,
+                    "Size of the page in bytes, such as 5M: what does not fit is made coarser [10 million]");
                 return [o, size](Session& session) {
-                    o->max_bytes = parse_bytes("--max-size", *size);
+                    if (!size->empty()) o->max_bytes = parse_bytes("--max-size", *size);
                     check_usage(*o);
                     run_report(*o, session);
                 };

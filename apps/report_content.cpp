@@ -12,6 +12,7 @@
 #include "converters/tet_file.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/measure/mesh_measures.h"
+#include "vdbgeo/view/png.h"
 #include "vdbgeo/view/report_page.h"
 
 namespace vdbgeo::app {
@@ -245,6 +246,30 @@ void add_figures(ReportContent& c, ReportFolder& folder) {
         if (!c.poster) c.poster = folder.picture(file, "The surface of the specimen, seen from three sides");
 }
 
+/// Makes pictures narrower until all together take no more than `most` bytes of the page: 580 pixels is what
+/// a page shows them with, twice that what fine screens do.
+void fit_pictures(ReportContent& c, double most) {
+    std::vector<PagePng*> pictures;
+    for (PageFigure& figure : c.pictures) pictures.push_back(&figure.image);
+    if (c.poster) pictures.push_back(&*c.poster);
+    for (const int width : {1160, 870, 580, 400}) {
+        double bytes = 0;
+        for (const PagePng* png : pictures) bytes += 4.0 / 3 * static_cast<double>(png->bytes.size());
+        if (bytes <= most) return;
+        for (PagePng* png : pictures) {
+            if (png->width <= width) continue;
+            try {
+                const Image small = scaled_down(read_png(png->bytes), width);
+                png->bytes = png_bytes(small);
+                png->width = small.width;
+                png->height = small.height;
+            } catch (const InvalidInput&) {
+                // Its chunks are whole, but not what they say: it goes into the page as it is.
+            }
+        }
+    }
+}
+
 void add_numbers(ReportContent& c, const ReportFolder& folder) {
     for (const RunStage& s : folder.stages()) {
         std::vector<std::vector<std::string>> rows = result_rows(s.result);
@@ -424,6 +449,7 @@ class ReportMaker {
         content_.summary = summary_text(facts_, pockets_);
         content_.facts = facts_terms(facts_, pockets_.size());
         add_figures(content_, folder_);
+        fit_pictures(content_, 0.45 * static_cast<double>(options_.max_bytes));
         add_numbers(content_, folder_);
         content_.glossary = glossary();
         add_how(content_, folder_);

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/view/colormap.h"
 
 namespace vdbgeo {
 namespace {
@@ -48,6 +51,38 @@ void paste(Image& image, const Image& piece, int x, int y) {
     if (left >= right) return;
     for (int row = std::max(0, -y); row < std::min(piece.height, image.height - y); ++row)
         std::copy_n(piece.at(left, row), 3 * (right - left), image.at(x + left, y + row));
+}
+
+Image scaled_down(const Image& image, int width) {
+    if (width < 1) throw InvalidInput(fmt::format("a picture cannot be {} pixels wide", width));
+    if (width >= image.width) return image;
+    const double step = static_cast<double>(image.width) / width;
+    Image small(width, std::max(1, static_cast<int>(std::lround(image.height / step))));
+    const double down = static_cast<double>(image.height) / small.height;
+    std::array<double, 256> light;
+    for (std::size_t i = 0; i < light.size(); ++i)
+        light[i] = double(srgb_to_linear(static_cast<float>(i) / 255));
+    const auto share = [](int i, double from, double to) {
+        return std::min(to, i + 1.0) - std::max(from, double(i));
+    };
+    parallel_for(static_cast<std::size_t>(small.height), 8, [&](std::size_t row) {
+        const double top = static_cast<double>(row) * down, bottom = top + down;
+        for (int x = 0; x < width; ++x) {
+            const double left = x * step, right = left + step;
+            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+            double area = 0;
+            for (int j = static_cast<int>(top); j < image.height && j < bottom; ++j)
+                for (int i = static_cast<int>(left); i < image.width && i < right; ++i) {
+                    const double part = share(j, top, bottom) * share(i, left, right);
+                    const std::uint8_t* p = image.at(i, j);
+                    sum += part * Eigen::Vector3d(light[p[0]], light[p[1]], light[p[2]]);
+                    area += part;
+                }
+            std::uint8_t* out = small.at(x, static_cast<int>(row));
+            for (int c = 0; c < 3; ++c) out[c] = to_byte(linear_to_srgb(static_cast<float>(sum[c] / area)));
+        }
+    });
+    return small;
 }
 
 void blend(Image& image, int x, int y, const Vec3f& colour, double cover) {

@@ -40,6 +40,10 @@ std::uint8_t to_byte(float channel);
 /// Copies `piece` with its upper left corner at pixel (x, y); what lies outside is left out.
 void paste(Image& image, const Image& piece, int x, int y);
 
+/// The picture at this width (its height follows), each pixel the mean of the light that falls on it. A width
+/// that is not smaller gives the picture back. InvalidInput unless `width` is at least 1.
+Image scaled_down(const Image& image, int width);
+
 /// Mixes `colour` into one pixel: cover 0 leaves it, 1 replaces it. Pixels outside the image are ignored.
 void blend(Image& image, int x, int y, const Vec3f& colour, double cover);
 

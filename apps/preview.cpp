@@ -72,7 +72,7 @@ Image Preview::draw() const {
             const int width = pixels(s.width * s.step_x), height = pixels(s.height * s.step_y);
             draw_section(image, s, {{}, row.greys.black, row.greys.white, ""}, left, top + heading, width,
                          height);
-            draw_text(image, {left + 0.5 * width, top + heading + height + 0.65 * heading}, s.title,
+            draw_text(image, {left + 0.5 * width, top + heading + height + 0.65 * heading}, s.title(),
                       0.85 * em, ink, TextAlign::centre);
             left += width + gap;
         }

@@ -75,7 +75,7 @@ void finish_slices(RenderCommandOptions& o, const CLI::App& flags) {
     refuse_flags(
         flags,
         {"--color-by", "--edges", "--view", "--zoom", "--focus", "--columns", "--height", "--samples",
-         "--occlusion", "--no-silhouette", "--silhouettes-only", "--clip", "--turntable"},
+         "--occlusion", "--no-scale-bar", "--no-silhouette", "--silhouettes-only", "--clip", "--turntable"},
         "means nothing to sections (--slices, --slice)");
     o.sections.files = o.files;
     o.sections.names = o.names;

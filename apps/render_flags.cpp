@@ -54,6 +54,8 @@ void add_scene_flags(CLI::App& app, RenderOptions& options) {
         "Place in the middle of the views, x,y,z in Å [the middle of what is drawn]");
     app.add_option("--columns", options.columns, "Meshes of one view in a row, 1 to 100 [to 3, or a square]");
     app.add_flag_callback(
+        "--no-scale-bar", [&options] { options.scale_bar = false; }, "Without the bar of round length");
+    app.add_flag_callback(
         "--no-silhouette", [&options] { options.outline = false; },
         "Without dark lines where the surface hides what is behind it");
     app.add_flag("--silhouettes-only", options.lines_only,

@@ -51,7 +51,9 @@ const std::vector<Promise> promises{
      {"--plane TEXT=y", "x,y,z in Å", "in Å³", "--at FLOAT=0.5", "--property TEXT=min_dihedral_deg",
       "--width INT=1600", "PNG"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
-    {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
+    {"render",
+     {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT=", "--slice",
+      "z=120A", "x,y,z in Å", "--turntable", "[white]"}},
     {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}}};
 
 /// The words of the lines below "Example:" that call a program.
@@ -125,7 +127,8 @@ TEST_F(Help, ExamplesRun) {
             // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
             for (std::size_t i = 2; i + 1 < words.size(); ++i)
                 if (words[i] == "--size") words[i + 1] = "24";
-            const bool picture = command == "render" || command == "model" ||
+            const bool sections = joined(words).find("--slices") != std::string::npos;
+            const bool picture = (command == "render" && !sections) || command == "model" ||
                                  (command == "cutaway" && words[3].find(".png") != std::string::npos);
             if (picture || joined(words).find("--picture") != std::string::npos)
                 for (const char* word : {"--width", "160"}) words.push_back(word);
@@ -136,11 +139,12 @@ TEST_F(Help, ExamplesRun) {
         }
     }
     for (const char* made :
-         {"emd_1080.vdb",     "smooth.mrc",        "smooth.png", "median.mrc",        "edges.mrc",
-          "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",   "flowed.mrc",        "smooth.vdb",
-          "atpase.mrc",       "clean.mrc",         "groel.png",  "groel/surface.ply", "good.ply",
-          "even.ply",         "curved.ply",        "small.ply",  "near.ply",          "smooth.ply",
-          "round.ply",        "sound.ply",         "clean.ply",  "levels.png",        "pockets.csv",
-          "pockets.png",      "tips.json",         "inside.png", "half.ply",          "peeled.png"})
+         {"emd_1080.vdb",     "smooth.mrc",        "smooth.png",   "median.mrc",        "edges.mrc",
+          "groel_mode_3.mrc", "groel_residue.mrc", "band.mrc",     "flowed.mrc",        "smooth.vdb",
+          "atpase.mrc",       "clean.mrc",         "groel.png",    "groel/surface.ply", "good.ply",
+          "even.ply",         "curved.ply",        "small.ply",    "near.ply",          "smooth.ply",
+          "round.ply",        "sound.ply",         "clean.ply",    "levels.png",        "pockets.csv",
+          "pockets.png",      "tips.json",         "inside.png",   "half.ply",          "peeled.png",
+          "both.png",         "slices.png",        "film_0004.png"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

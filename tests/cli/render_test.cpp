@@ -129,12 +129,12 @@ TEST_F(RenderCli, BackgroundsAndLines) {
     EXPECT_EQ(corner("#12aBef"), std::vector<int>({0x12, 0xab, 0xef}));
     EXPECT_LT(corner("dark")[0], 40);
     std::set<std::string> pictures;
-    for (const char* flag :
-         {"--edges", "--no-silhouette", "--silhouettes-only", "--zoom=3", "--focus=3,0,0"}) {
+    for (const char* flag : {"--edges", "--no-scale-bar", "--no-silhouette", "--silhouettes-only", "--zoom=3",
+                             "--focus=3,0,0"}) {
         good(quick({mesh_, at("l.png"), flag}));
         pictures.insert(bytes("l.png"));
     }
-    EXPECT_EQ(pictures.size(), 5u);
+    EXPECT_EQ(pictures.size(), 6u);
 }
 
 TEST_F(RenderCli, SameBytesForAnyThreads) {

@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/cutaway_picture.h"
 #include "apps/flags.h"
+#include "apps/render_flags.h"
 #include "apps/render_slices.h"
 #include "apps/stages.h"
 #include "converters/mesh_file.h"
@@ -74,7 +75,7 @@ void finish_slices(RenderCommandOptions& o, const CLI::App& flags) {
     refuse_flags(
         flags,
         {"--color-by", "--edges", "--view", "--zoom", "--focus", "--columns", "--height", "--samples",
-         "--occlusion", "--no-silhouette", "--silhouettes-only", "--clip", "--turntable"},
+         "--occlusion", "--no-scale-bar", "--no-silhouette", "--silhouettes-only", "--clip", "--turntable"},
         "means nothing to sections (--slices, --slice)");
     o.sections.files = o.files;
     o.sections.names = o.names;
@@ -208,6 +209,7 @@ void add_flags(CLI::App& app, RenderCommandOptions& o) {
                    "Write this many frames of a full turn about the upright axis: OUT_0001.png \u2026")
         ->check(CLI::Range(1, 10000).description(""));
     add_render_flags(app, o.render);
+    add_scene_flags(app, o.render);
     o.iso.add(app);
     o.map.add_reading(app);
 }

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "converters/emdb_record.h"
-#include "vdbgeo/view/theme.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -69,23 +68,6 @@ std::optional<Vec3d> parse_triple(const std::string& text, bool one_is_enough) {
     if (numbers.size() == 1 && one_is_enough) return Vec3d::Constant(numbers[0]);
     if (numbers.size() != 3) return {};
     return Vec3d(numbers[0], numbers[1], numbers[2]);
-}
-
-/// "white", "black", "dark" or "#rrggbb".
-std::optional<Vec3f> parse_colour(const std::string& text) {
-    if (text == "white") return Theme::light().paper;
-    if (text == "black") return Vec3f(0, 0, 0);
-    if (text == "dark") return Theme::dark().paper;
-    if (text.size() != 7 || text[0] != '#') return {};
-    Vec3f colour;
-    for (int c = 0; c < 3; ++c) {
-        int value = 0;
-        const char* at = text.data() + 1 + 2 * c;
-        const auto [rest, error] = std::from_chars(at, at + 2, value, 16);
-        if (error != std::errc() || rest != at + 2 || value < 0) return {};
-        colour[c] = static_cast<float>(value) / 255;
-    }
-    return colour;
 }
 
 }  // namespace
@@ -241,17 +223,6 @@ void add_render_flags(CLI::App& app, RenderOptions& options) {
     app.add_option("--view", options.view,
                    "three, front, side, top, iso, or x,y,z: the direction towards the viewer")
         ->capture_default_str();
-    app.add_option("--zoom", options.zoom, "Magnify about the middle of the views, 0.1 to 100")
-        ->capture_default_str();
-    app.add_option_function<std::string>(
-        "--focus",
-        [&options](const std::string& text) {
-            options.focus = parse_triple(text, false);
-            if (!options.focus)
-                throw CLI::ValidationError("--focus", fmt::format("'{}' is not x,y,z in Å", text));
-        },
-        "Place in the middle of the views, x,y,z in Å [the middle of what is drawn]");
-    app.add_option("--columns", options.columns, "Meshes of one view in a row, 1 to 100 [to 3, or a square]");
     app.add_option("--color-by", options.property,
                    "Property of the vertices or faces to colour by [plain colour]");
     app.add_option("--color-label", options.label,
@@ -262,21 +233,6 @@ void add_render_flags(CLI::App& app, RenderOptions& options) {
     app.add_option("--max", options.range_max,
                    "Value of the last colour, in the property's unit [98th percentile]");
     app.add_flag("--edges", options.edges, "Draw the edges of the faces");
-    app.add_flag_callback(
-        "--no-silhouette", [&options] { options.outline = false; },
-        "Without dark lines where the surface hides what is behind it");
-    app.add_flag("--silhouettes-only", options.lines_only,
-                 "A drawing of nothing but these lines, and of the edges with --edges");
-    app.add_option_function<std::string>(
-        "--background",
-        [&options](const std::string& text) {
-            const auto colour = parse_colour(text);
-            if (!colour)
-                throw CLI::ValidationError("--background",
-                                           fmt::format("'{}' is not white, black, dark or #rrggbb", text));
-            options.background = *colour;
-        },
-        "white, black, dark or #rrggbb; words and bars take an ink that can be read on it [white]");
     app.add_option("--samples", options.samples, "Rays a pixel: 1, 4, 9 or 16")->capture_default_str();
     app.add_option("--occlusion", options.occlusion_rays, "Rays of ambient occlusion each, 0 to 1024")
         ->capture_default_str();

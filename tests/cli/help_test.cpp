@@ -54,9 +54,13 @@ const std::vector<Promise> promises{
      {"--plane TEXT=y", "x,y,z in Å", "in Å³", "--at FLOAT=0.5", "--property TEXT=min_dihedral_deg",
       "--width INT=1600", "PNG"}},
     {"validate", {"--table", "[all]", "0.0125 Å"}},
-    {"render", {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT="}},
-    {"model", {"--iso TEXT=auto", "--width INT=1600", "Voxel size in Å", "-o,--out"}},
-    {"report", {"--faces UINT=200000", "--tets UINT=200000", "--max-size TEXT=10M", "--title"}}};
+    {"render",
+     {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT=", "--slice",
+      "z=120A", "x,y,z in Å", "--turntable", "[white]"}},
+    {"model",
+     {"--iso TEXT=auto", "in pixels [1200]", "Voxel size in Å", "-o,--out", "--preset TEXT=molecule", "--set",
+      "--from"}},
+    {"report", {"--faces UINT=200000", "--tets UINT=200000", "[10 million]", "--title"}}};
 
 /// The words of the lines below "Example:" that call a program.
 std::vector<Words> examples_in(const std::string& help) {
@@ -131,7 +135,8 @@ TEST_F(Help, ExamplesRun) {
             // Small enough for a test; the last value of a flag that is given twice is refused, so replace.
             for (std::size_t i = 2; i + 1 < words.size(); ++i)
                 if (words[i] == "--size") words[i + 1] = "24";
-            const bool picture = command == "render" || command == "model" ||
+            const bool sections = joined(words).find("--slices") != std::string::npos;
+            const bool picture = (command == "render" && !sections) || command == "model" ||
                                  (command == "cutaway" && words[3].find(".png") != std::string::npos);
             if (picture || joined(words).find("--picture") != std::string::npos)
                 for (const char* word : {"--width", "160"}) words.push_back(word);
@@ -152,6 +157,8 @@ TEST_F(Help, ExamplesRun) {
                              "density.svg",       "spectra.svg",       "k.svg",
                              "k1k2.svg",          "pockets.csv",       "pockets.png",
                              "tips.json",         "inside.png",        "half.ply",
-                             "peeled.png",        "groel/report.html"})
+                             "peeled.png",        "groel/report.html", "both.png",
+                             "slices.png",        "film_0004.png",     "tomo/report.html",
+                             "other/report.html"})
         EXPECT_TRUE(listing().count(made)) << made;
 }

@@ -11,6 +11,8 @@
 
 #include "tests/support/meshes.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/view/colormap.h"
+#include "vdbgeo/view/property_text.h"
 
 using namespace vdbgeo;
 using namespace vdbgeo::test;
@@ -454,6 +456,12 @@ TEST(Render, BadOptionsAreNamed) {
     bad([](RenderOptions& o) { o.range_min = std::numeric_limits<double>::infinity(); });
     bad([](RenderOptions& o) { o.range_min = 2, o.range_max = 1; });
     bad([](RenderOptions& o) { o.surface.x() = 2; });
+    bad([](RenderOptions& o) { o.zoom = 0; });
+    bad([](RenderOptions& o) { o.zoom = std::numeric_limits<double>::quiet_NaN(); });
+    bad([](RenderOptions& o) { o.focus = Vec3d(0, std::numeric_limits<double>::infinity(), 0); });
+    bad([](RenderOptions& o) { o.columns = 0; });
+    bad([](RenderOptions& o) { o.lines_only = true, o.outline = false; });
+    bad([](RenderOptions& o) { o.lines_only = true, o.property = "H"; });
     bad([](RenderOptions& o) { o.background.y() = std::numeric_limits<float>::quiet_NaN(); });
 }
 
@@ -470,4 +478,213 @@ TEST(Render, ReportsProgressAndCancels) {
     render(icosphere(2, 1), bare("front", 128), Progress([&](double) { return ++reports, true; }));
     EXPECT_GT(reports, 4);
     EXPECT_THROW(render(icosphere(2, 1), bare(), Progress([](double f) { return f < 0.3; })), Cancelled);
+}
+
+TEST(Render, SeveralMeshesHaveOneScale) {
+    NEEDS_EMBREE();
+    const TriMesh small = icosphere(4, 1),
+                  large = moved(icosphere(4, 2), Mat3d::Identity(), Vec3d(100, 0, 0));
+    RenderOptions options = bare("front", 600);
+    options.samples = 1;
+    const Image image = render({{&small, ""}, {&large, ""}}, options);
+    // Two discs with a gap between them.
+    std::vector<int> widths;
+    for (int x = 0, run = 0; x < image.width; ++x) {
+        bool any = false;
+        for (int y = 0; y < image.height; ++y) any = any || !is_background(image, x, y);
+        if (any) ++run;
+        if (!any && run > 0) widths.push_back(run);
+        if (!any) run = 0;
+    }
+    ASSERT_EQ(widths.size(), 2u);
+    EXPECT_NEAR(widths[1] / static_cast<double>(widths[0]), 2, 0.03);
+    EXPECT_GT(widths[0], 150);
+    // Six of them in two rows of three, with names above: the names' ink is all that is added.
+    const RenderItem item{&small, ""}, named{&small, "name"};
+    options.height.reset();
+    const Image six = render({item, item, item, item, item, item}, options);
+    EXPECT_NEAR(six.height / static_cast<double>(six.width), 2.0 / 3, 0.1);
+    options.columns = 6;
+    const Image row = render({item, item, item, item, item, item}, options);
+    EXPECT_LT(row.height, six.height / 2);
+    EXPECT_GT(render({named, named, named, named, named, named}, options).height, row.height);
+    EXPECT_THROW(render(std::vector<RenderItem>(), options), InvalidInput);
+    const TriMesh empty;
+    try {
+        render({item, {&empty, "nothing.ply"}}, options);
+        FAIL();
+    } catch (const InvalidInput& e) {
+        EXPECT_EQ(std::string(e.what()).rfind("nothing.ply: ", 0), 0u) << e.what();
+    }
+}
+
+TEST(Render, MeshesInTheSamePlaceAreInOneFrame) {
+    NEEDS_EMBREE();
+    // A part that sticks out of one of them does not shift the other.
+    const TriMesh ball = icosphere(4, 10),
+                  more = joined(ball, moved(icosphere(2, 1), Mat3d::Identity(), Vec3d(0, 0, 10.5)));
+    RenderOptions options = bare("front", 400);
+    options.samples = 1;
+    options.outline = false;
+    const Image image = render({{&ball, ""}, {&more, ""}}, options);
+    // The widest row of each ball.
+    const auto widest = [&](int from, int to) {
+        int best = 0, where = 0;
+        for (int y = 0; y < image.height; ++y) {
+            int count = 0;
+            for (int x = from; x < to; ++x) count += !is_background(image, x, y);
+            if (count > best) best = count, where = y;
+        }
+        return std::pair(best, where);
+    };
+    const auto [a, row_a] = widest(0, 200);
+    const auto [b, row_b] = widest(200, 400);
+    EXPECT_NEAR(a, b, 1);
+    EXPECT_NEAR(row_a, row_b, 3);
+}
+
+TEST(Render, SeveralMeshesShareTheirColours) {
+    NEEDS_EMBREE();
+    const auto square = [](float value, double x) {
+        TriMesh mesh;
+        mesh.points = {{0, 0, 0}, {10, 0, 0}, {10, 0, 10}, {0, 0, 10}};
+        for (Vec3f& p : mesh.points) p.x() += static_cast<float>(x);
+        mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+        mesh.vertex_properties = {{"q", 1, std::vector<float>(4, value)}};
+        return mesh;
+    };
+    const TriMesh low = square(0, 0), high = square(8, 500);
+    RenderOptions options = bare("front", 400);
+    options.property = "q";
+    const Image two = render({{&low, ""}, {&high, ""}}, options);
+    const Vec3f first = colour_at(two, 100, 170), second = colour_at(two, 300, 170);
+    EXPECT_GT(second.sum(), first.sum() + 0.5f);  // dark blue and pale yellow
+    TriMesh bare_mesh = low;
+    bare_mesh.vertex_properties.clear();
+    EXPECT_THROW(render({{&low, "a"}, {&bare_mesh, "b"}}, options), InvalidInput);
+}
+
+TEST(Render, ZoomMagnifiesAboutTheFocus) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 300);
+    options.samples = 1;
+    options.outline = false;
+    const TriMesh ball = moved(icosphere(5, 10), Mat3d::Identity(), Vec3d(5, 6, 7));
+    options.zoom = 0.5;
+    const double half = silhouette(render(ball, options)).width();
+    options.zoom = 1;
+    const double whole = silhouette(render(ball, options)).width();
+    EXPECT_NEAR(whole / half, 2, 0.03);
+    options.zoom = 4;  // nothing but surface in the view, which has margins
+    EXPECT_EQ(silhouette(render(ball, options)).pixels,
+              std::pow(silhouette(render(ball, options)).width(), 2));
+    options.zoom = 1;
+    options.focus = Vec3d(5, 6, 17);  // the upper end of the ball
+    const Silhouette lower = silhouette(render(ball, options));
+    EXPECT_NEAR(lower.top, 150, 3);
+    EXPECT_NEAR((lower.left + lower.right) / 2.0, 149.5, 2);
+}
+
+TEST(Render, ATurntableTurnsWhatIsSeen) {
+    NEEDS_EMBREE();
+    const TriMesh mesh = lopsided();
+    const RenderOptions options = bare("front", 160);
+    const auto frames = [&](const TriMesh& m, int n, const RenderOptions& o) {
+        std::vector<Image> images;
+        render_turntable({{&m, ""}}, n, o, [&](int i, const Image& image) {
+            EXPECT_EQ(static_cast<std::size_t>(i), images.size());
+            images.push_back(image);
+        });
+        return images;
+    };
+    const std::vector<Image> film = frames(mesh, 4, options);
+    ASSERT_EQ(film.size(), 4u);
+    for (const Image& image : film) EXPECT_EQ(std::pair(image.width, image.height), std::pair(160, 160));
+    // Each frame is the first of the mesh that was turned, counter-clockwise seen from above.
+    for (int k = 1; k < 4; ++k) {
+        const TriMesh turned_mesh = moved(mesh, turn(90.0 * k, Vec3d::UnitZ()));
+        const double same =
+            mean_difference(film[static_cast<std::size_t>(k)], frames(turned_mesh, 4, options)[0]);
+        EXPECT_LT(same, 0.3) << k;
+        EXPECT_GT(mean_difference(film[static_cast<std::size_t>(k)], film[0]), 3) << k;
+    }
+    // What looks the same from the four sides needs no more room in a turn than in one picture.
+    const TriMesh round = torus_mesh(10, 3, 64, 32);
+    EXPECT_LT(mean_difference(frames(round, 4, options)[0], render(round, options)), 0.05);
+    EXPECT_LT(mean_difference(frames(round, 4, options)[3], render(round, options)), 0.3);
+    EXPECT_THROW(frames(mesh, 0, options), InvalidInput);
+    EXPECT_THROW(frames(mesh, 10001, options), InvalidInput);
+}
+
+TEST(Render, WordsCanBeReadOnAnyBackground) {
+    NEEDS_EMBREE();
+    for (const float paper : {0.0f, 0.08f, 0.9f, 1.0f}) {
+        RenderOptions options = bare("front", 400);
+        options.scale_bar = true;
+        options.background = Vec3f::Constant(paper);
+        const Image image = render(icosphere(3, 100), options);
+        EXPECT_NEAR(colour_at(image, 2, 2).x(), paper, 0.003);
+        // The longest run of one colour below the ball that is not the paper is the scale bar.
+        int longest = 0;
+        float ink = paper;
+        for (int y = 330; y < 400; ++y)
+            for (int x = 1, run = 0; x < 400; ++x) {
+                const Vec3f c = colour_at(image, x, y);
+                run = c == colour_at(image, x - 1, y) && std::abs(c.x() - paper) > 0.1f ? run + 1 : 0;
+                // Its upper and lower rows are covered in part.
+                if (run > longest || (run == longest && std::abs(c.x() - paper) > std::abs(ink - paper)))
+                    longest = run, ink = c.x();
+            }
+        EXPECT_GT(longest, 30);
+        EXPECT_GT(std::abs(luminance(Vec3f::Constant(ink)) - luminance(Vec3f::Constant(paper))), 0.5);
+    }
+}
+
+TEST(Render, ADrawingIsLinesOnPaper) {
+    NEEDS_EMBREE();
+    RenderOptions options = bare("front", 300);
+    options.lines_only = true;
+    const Image image = render(icosphere(5, 10), options);
+    EXPECT_TRUE(is_background(image, 150, 150));  // inside the ball
+    const Silhouette s = silhouette(image);
+    EXPECT_LT(s.pixels, 6 * M_PI * s.width());
+    EXPECT_GT(s.pixels, 0.8 * M_PI * s.width());
+    options.outline = false;
+    EXPECT_THROW(render(icosphere(1, 10), options), InvalidInput);
+    options.edges = true;
+    EXPECT_GT(silhouette(render(icosphere(1, 10), options)).pixels, 500);
+}
+
+TEST(Render, KnownPropertiesHaveWordsAndUnits) {
+    EXPECT_EQ(property_text("H").label, "mean curvature H (1/Å)");
+    EXPECT_EQ(property_text("K").label, "Gaussian curvature K (1/Å²)");
+    EXPECT_EQ(property_text("my_own").label, "my_own");
+    EXPECT_TRUE(property_text("type").classes);
+    EXPECT_FALSE(property_text("k1").classes);
+    NEEDS_EMBREE();
+    // Classes are not blended, without being told so; with names they have a legend of as many swatches.
+    TriMesh mesh = icosphere(4, 10);
+    MeshProperty type{"type", 1, {}};
+    for (const Vec3f& p : mesh.points) type.values.push_back(p.x() < 0 ? 0.0f : 3.0f);
+    mesh.vertex_properties.push_back(type);
+    RenderOptions options = bare("front", 400);
+    options.property = "type";
+    const Image numbers = render(mesh, options);
+    EXPECT_GT(colour_at(numbers, 120, 160).z(), colour_at(numbers, 120, 160).x());
+    EXPECT_GT(colour_at(numbers, 280, 160).x(), colour_at(numbers, 280, 160).z());
+    options.class_names = {{0, "peak"}, {3, "flat"}};
+    const Image names = render(mesh, options);
+    const Colormap map("categorical");
+    const auto swatch = [&](const Image& image, int number) {
+        int pixels = 0;
+        for (int y = 320; y < 400; ++y)
+            for (int x = 0; x < 400; ++x)
+                pixels += (colour_at(image, x, y) - map.category(number)).cwiseAbs().maxCoeff() < 0.01f;
+        return pixels;
+    };
+    for (const int number : {0, 3}) EXPECT_GT(swatch(names, number), 30) << number;
+    for (const int number : {1, 2}) {
+        EXPECT_EQ(swatch(names, number), 0) << number;
+        EXPECT_GT(swatch(numbers, number), 30) << number;
+    }
 }

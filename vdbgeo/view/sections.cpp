@@ -225,6 +225,15 @@ Figure arrange(const std::vector<SectionRow>& rows, const SectionFigureOptions& 
     return f;
 }
 
+/// The isovalues that are drawn, each once.
+std::vector<double> contours_of(const std::vector<SectionRow>& rows) {
+    std::vector<double> found;
+    for (const SectionRow& row : rows)
+        if (row.isovalue && std::find(found.begin(), found.end(), *row.isovalue) == found.end())
+            found.push_back(*row.isovalue);
+    return found;
+}
+
 ColourScale scale_of(const std::vector<SectionRow>& rows, const SectionFigureOptions& options) {
     std::vector<const Section*> all;
     for (const SectionRow& row : rows)
@@ -245,6 +254,8 @@ ColourScale scale_of(const std::vector<SectionRow>& rows, const SectionFigureOpt
         (options.range_min ? scale.high : scale.low) = options.range_min ? scale.low + pad : scale.high - pad;
     }
     scale.label = options.label;
+    const std::vector<double> contours = contours_of(rows);
+    if (contours.size() == 1) scale.label += fmt::format("; contour at {:.4g}", contours[0]);
     return scale;
 }
 
@@ -308,7 +319,14 @@ Image draw_section_figure(const std::vector<SectionRow>& rows, const SectionFigu
     const double middle = left + 0.42 * (right - left);
     draw_scale_bar(image, {left, right, top, f.em}, std::min(middle - 2 * f.em - left, 0.25 * options.width),
                    f.pixels_per_A, ink);
-    draw_colour_bar(image, {middle, right - 1.5 * f.em, top, f.em}, scale, ink);
+    const BarStrip bar{middle, right - 1.5 * f.em, top, f.em};
+    draw_colour_bar(image, bar, scale, ink);
+    for (const double isovalue : contours_of(rows)) {  // marked on the bar
+        const double part = (isovalue - scale.low) / (scale.high - scale.low);
+        const double x = bar.left + part * (bar.right - bar.left), y = top + 1.8 * f.em;
+        if (part >= 0 && part <= 1)
+            draw_line(image, {x, y}, {x, y + 1.05 * f.em}, std::max(2.0, 0.14 * f.em), options.contour);
+    }
     return image;
 }
 

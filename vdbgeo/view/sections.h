@@ -83,9 +83,9 @@ struct SectionFigureOptions {
 };
 
 /// A row for each map, all sections at one scale and with the same colours, each with its place under it;
-/// below them a scale bar and the colours with their densities. The picture is as high as that needs, where
-/// one row is at most as high as wide. InvalidInput without rows, for a row without sections, and where the
-/// picture would be higher than Image::max_side.
+/// below them a scale bar and the colours with their densities, contours among them. The picture is as high
+/// as that needs, where one row is at most as high as wide. InvalidInput without rows, for a row without
+/// sections, and where the picture would be higher than Image::max_side.
 Image draw_section_figure(const std::vector<SectionRow>& rows, const SectionFigureOptions& options = {});
 
 }  // namespace vdbgeo

@@ -128,7 +128,7 @@ void add_flags(CLI::App& app, ModelFlags& flags) {
         add_vdb_flags(app, flags.vdb);
     });
     pass_on(app, flags, "pictures", [&] {
-        app.add_option("--width", flags.width, "Width of the pictures in pixels [1200]");
+        app.add_option("--width", flags.width, "Width of the pictures in pixels [1000]");
         app.add_option("--view", flags.view, "Of the pictures: three, front, side, top, iso, or x,y,z");
         app.add_option("--occlusion", flags.occlusion,
                        "Rays of ambient occlusion in the pictures, 0 to 1024");

@@ -45,7 +45,7 @@ Lines picture_lines(const ModelState& m) {
         Words words{"render"};
         for (const std::string& in : inputs) words.push_back(m.at(in));
         words.push_back(m.at(picture));
-        usual.insert(usual.begin(), {"--width", "1200"});
+        usual.insert(usual.begin(), {"--width", "1000", "--occlusion", "4"});
         lines.push_back(compose(std::move(words), usual, m, "pictures"));
     };
     if (!m.labels()) {
@@ -63,11 +63,16 @@ Lines picture_lines(const ModelState& m) {
         for (const auto& [property, file] : property_pictures)
             add({m.fullest_mesh()}, file, {"--color-by", property});
     if (m.on("tets")) {
-        lines.push_back({"cutaway", m.at("tets.vtu"), m.at("cut.png"), "--width", "1200"});
+        const Words size{"--width", "800", "--occlusion", "4"};
+        Words cut{"cutaway", m.at("tets.vtu"), m.at("cut.png")};
         // A quarter of the body is taken away, from the front (cf. the paper's Fig 16).
         const Json tets = m.results.value("tets", Json::object()).value("tets", Json(4));
-        lines.push_back({"cutaway", m.at("tets.vtu"), m.at("peel.png"), "--width", "1200", "--peel",
-                         fmt::format("{}", tets.get<std::uint64_t>() / 4)});
+        Words peel{"cutaway", m.at("tets.vtu"), m.at("peel.png"), "--peel",
+                   fmt::format("{}", tets.get<std::uint64_t>() / 4)};
+        for (Words* words : {&cut, &peel}) {
+            words->insert(words->end(), size.begin(), size.end());
+            lines.push_back(*words);
+        }
     }
     return lines;
 }
@@ -114,7 +119,7 @@ Lines curvature_lines(const ModelState& m) {
 Lines pocket_lines(const ModelState& m) {
     return {compose({"pockets", m.at("curved.ply"), m.at("pockets.csv"), "--mesh", m.at("pockets.ply"),
                      "--picture", m.at("pockets_picture.png")},
-                    {"--width", "1200"}, m, "pockets"),
+                    {"--width", "1000"}, m, "pockets"),
             compose({"pockets", m.at("curved.ply"), m.at("pockets.json")}, {}, m, "pockets")};
 }
 

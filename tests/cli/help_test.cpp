@@ -58,7 +58,7 @@ const std::vector<Promise> promises{
      {"--width INT=1600", "in pixels", "--view TEXT=three", "--samples INT=", "--occlusion INT=", "--slice",
       "z=120A", "x,y,z in Å", "--turntable", "[white]"}},
     {"model",
-     {"--iso TEXT=auto", "in pixels [1200]", "Voxel size in Å", "-o,--out", "--preset TEXT=molecule", "--set",
+     {"--iso TEXT=auto", "in pixels [1000]", "Voxel size in Å", "-o,--out", "--preset TEXT=molecule", "--set",
       "--from"}},
     {"report", {"--faces UINT=200000", "--tets UINT=200000", "[10 million]", "--title"}}};
 

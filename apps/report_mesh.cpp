@@ -216,21 +216,38 @@ double mean_edge(const TetMesh& mesh) {
 
 TetMesh PageTets::coarser(std::uint64_t tets, const Progress& progress) {
     constexpr int most_tries = 12;
-    constexpr double voxels_a_cell = 1.5;
+    constexpr double voxels_a_cell = 1.5, enough = 0.6;
     if (!boundary_) boundary_ = boundary_surface(mesh_);
     const auto wanted = static_cast<double>(tets);
     if (side_A_ == 0) side_A_ = mean_edge(mesh_) * std::sqrt(static_cast<double>(mesh_.tets.size()) / wanted);
+    TetMesh best;
+    double too_fine = 0, best_side = 0, side = side_A_;
     for (int i = 0; i < most_tries; ++i) {
-        const auto grid = mesh_level_set(*boundary_, side_A_ / voxels_a_cell);
-        StuffingOptions options;
-        options.cell = voxels_a_cell;
-        TetMesh filled = isosurface_stuffing(turned_over(map_from_grid(grid)), 0, options);
-        if (filled.tets.size() <= tets) return filled;
+        TetMesh filled;
+        try {
+            StuffingOptions options;
+            options.cell = voxels_a_cell;
+            const auto grid = mesh_level_set(*boundary_, side / voxels_a_cell);
+            filled = isosurface_stuffing(turned_over(map_from_grid(grid)), 0, options);
+        } catch (const NumericalError&) {  // so coarse that nothing is inside
+        }
+        const auto count = static_cast<double>(filled.tets.size());
         // Their number goes with the side's second power where the body is thin, with the third where not.
-        side_A_ *= std::max(1.03, 1.02 * std::sqrt(static_cast<double>(filled.tets.size()) / wanted));
+        if (count > wanted) {
+            too_fine = side;
+            side *= std::max(1.03, 1.02 * std::sqrt(count / wanted));
+            if (best_side > 0) side = std::min(side, (too_fine + best_side) / 2);
+        } else {
+            if (filled.tets.size() > best.tets.size()) best = std::move(filled), best_side = side;
+            if (count >= enough * wanted) break;
+            const double finer = side * std::clamp(std::sqrt(count / wanted), 0.5, 0.95);
+            side = too_fine > 0 ? std::max(finer, (too_fine + side) / 2) : finer;
+        }
         progress.report(static_cast<double>(i + 1) / most_tries);
     }
-    throw NumericalError("it has no filling with so few tetrahedra");
+    if (best.empty()) throw NumericalError("it has no filling with so few tetrahedra");
+    side_A_ = best_side;
+    return best;
 }
 
 PageMesh PageTets::at_most(std::uint64_t tets, const Progress& progress) {

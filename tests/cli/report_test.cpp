@@ -40,9 +40,9 @@ class Report : public Cli {
         stage("map", "Map", {"convert", at("specimen.mrc"), in("density.vdb")});
         stage("surface", "Surface", {"surface", in("density.vdb"), in("surface.ply"), "--iso", "0.5"});
         stage("curvature", "Curvature", {"curvature", in("surface.ply"), in("curved.ply")});
-        stage(
-            "pockets", "Pockets",
-            {"pockets", in("curved.ply"), in("pockets.csv"), "--mesh", in("pockets.ply"), "--min-area", "1"});
+        stage("pockets", "Pockets",
+              {"pockets", in("curved.ply"), in("pockets.csv"), "--mesh", in("pockets.ply"), "--min-area", "1",
+               "--k2-below", "-0.001", "--k1-below", "inf"});
         stage("tets", "Tetrahedra", {"tetrahedralize", in("density.vdb"), in("tets.vtu"), "--iso", "0.5"});
         stages.push_back({{"name", "denoise"}, {"title", "Noise removal"}, {"status", "off"}});
         good({"render", in("curved.ply"), in("mean.png"), "--color-by", "H", "--width", "160", "--occlusion",

@@ -272,6 +272,11 @@ Json ModelRun::run() {
     for (std::size_t i = first; i <= last; ++i)  // nothing is begun that cannot be ended
         if (state_.on(stages[i].name))
             for (const auto& line : stages[i].lines(state_)) check_words(line);
+    std::error_code error;
+    if (first > 0 && !fs::is_directory(options_.folder, error))
+        throw InvalidInput(
+            fmt::format("{}: there is no such folder; --from {} takes what earlier stages left there",
+                        options_.folder, options_.from));
     make_folder();
     for (std::size_t i = 0; i <= last; ++i) {
         const ModelStage& stage = stages[i];
@@ -289,7 +294,8 @@ Json ModelRun::run() {
         if (const auto missing = missing_input(stage)) {
             const std::string why = fmt::format("needs {}, which is not there", *missing);
             keep({{"name", stage.name}, {"title", stage.title}, {"status", "failed"}, {"error", why}});
-            if (stage.essential) throw InvalidInput(fmt::format("{}: {} {}", options_.folder, stage.name, why));
+            if (stage.essential)
+                throw InvalidInput(fmt::format("{}: {} {}", options_.folder, stage.name, why));
             session_.warn(fmt::format("{} {}", stage.name, why));
             give_up(stage);
             continue;

@@ -118,7 +118,10 @@ TEST_F(ModelRuns, InPartsGivesTheSameBytes) {
     const Json changed = model({"--iso", "0", "--from", "remesh"});
     EXPECT_EQ(statuses(changed)["remesh"], "done");
     EXPECT_FALSE(bytes("m/mesh.ply") == bytes("whole/mesh.ply"));
-    expect_error(vdbgeo(words(map_, {"--from", "remesh"}, "nowhere")), 3, at("nowhere"), "density.vdb");
+    expect_error(vdbgeo(words(map_, {"--from", "remesh"}, "nowhere")), 3, at("nowhere"), "--from remesh");
+    EXPECT_FALSE(fs::exists(at("nowhere")));
+    fs::create_directory(at("empty"));
+    expect_error(vdbgeo(words(map_, {"--from", "remesh"}, "empty")), 3, at("empty"), "density.vdb");
 }
 
 TEST_F(ModelRuns, AFileOfOptionsAndASummaryAreOptions) {

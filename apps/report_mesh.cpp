@@ -226,9 +226,13 @@ TetMesh PageTets::coarser(std::uint64_t tets, const Progress& progress) {
         TetMesh filled;
         try {
             StuffingOptions options;
-            options.cell = voxels_a_cell;
-            const auto grid = mesh_level_set(*boundary_, side / voxels_a_cell);
-            filled = isosurface_stuffing(turned_over(map_from_grid(grid)), 0, options);
+            // Filling is quick, distances to the boundary are not: one grid serves cells of several sizes.
+            if (!inside_ || side < 0.75 * voxel_A_ || side > 3 * voxel_A_) {
+                voxel_A_ = side / voxels_a_cell;
+                inside_ = turned_over(map_from_grid(mesh_level_set(*boundary_, voxel_A_)));
+            }
+            options.cell = side / voxel_A_;
+            filled = isosurface_stuffing(*inside_, 0, options);
         } catch (const NumericalError&) {  // so coarse that nothing is inside
         }
         const auto count = static_cast<double>(filled.tets.size());

@@ -11,6 +11,7 @@
 #include "vdbgeo/core/tri_mesh.h"
 #include "vdbgeo/measure/triangle_tree.h"
 #include "vdbgeo/view/page_mesh.h"
+#include "vdbgeo/volume/density_map.h"
 
 namespace vdbgeo::app {
 
@@ -60,6 +61,8 @@ class PageTets {
 
     TetMesh mesh_;
     std::optional<TriMesh> boundary_;
+    std::optional<DensityMap> inside_;  ///< distance to the boundary, positive inside, at voxels of voxel_A_
+    double voxel_A_ = 0;
     double side_A_ = 0;  ///< of the cubes that were used last
 };
 

@@ -217,8 +217,9 @@ TEST_F(ModelRuns, OfLabelsFillsEachOfThem) {
                 if (vdbgeo::Vec3d(x - 15.5, y - 15.5, z - 15.5).norm() < 11)
                     write.setValueOn(openvdb::Coord(x, y, z), x < 16 ? 1.0f : 2.0f);
     vdbgeo::write_vdb({in.map.grid}, at("labels.vdb"));
+    good({"convert", at("labels.vdb"), at("labels.mrc"), "--quiet"});
     const Json summary =
-        Json::parse(good(words(at("labels.vdb"), {"--preset", "label"})).out, nullptr, false);
+        Json::parse(good(words(at("labels.mrc"), {"--preset", "label"})).out, nullptr, false);
     EXPECT_EQ(summary["status"], "done");
     EXPECT_EQ(statuses(summary)["denoise"], "off");
     EXPECT_EQ(stage(summary, "tets")["result"]["regions"].size(), 2u);

@@ -68,7 +68,8 @@ class Model : public Cli {
         EXPECT_EQ(measured.size(), 2u);
         for (const char* key : {"vertices", "faces", "genus", "boundary_edges", "area_A2", "volume_A3"})
             EXPECT_EQ(measured[0][key], j[key]) << key;
-        EXPECT_GT(measured[1]["min_angle_deg"], 5.0);
+        EXPECT_LT(measured[1]["below_30_percent"], 0.5);
+        EXPECT_LT(measured[1]["below_30_percent"], 0.1 * measured[0]["below_30_percent"].get<double>());
         for (const char* name : {"m/map.png", "m/mean.png", "m/cut.png"}) {
             const Picture picture = read_picture(at(name));
             EXPECT_GT(picture.colours, 30u) << name;

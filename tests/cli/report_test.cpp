@@ -31,7 +31,7 @@ class Report : public Cli {
             stages.push_back({{"name", key},
                               {"title", title},
                               {"status", "done"},
-                              {"command", words},
+                              {"commands", Json::array({words})},
                               {"seconds", 0.5},
                               {"warnings", Json::array()},
                               {"files", Json::array()},
@@ -227,7 +227,7 @@ TEST_F(Report, ScriptsInFilesStayText) {
     const std::string folder = run_folder("run");
     make("run/density.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\"><script>alert(1)</script></svg>");
     summary_["input"] = "</title><script>alert(2)</script>.mrc";
-    summary_["stages"][1]["command"] = {"surface", "<img src=x onerror=alert(3)>", "it's"};
+    summary_["stages"][1]["commands"] = Json::array({{"surface", "<img src=x onerror=alert(3)>", "it's"}});
     summary_["stages"][1]["result"]["<b>key</b>"] = "</script><script>alert(4)</script>";
     make("run/summary.json", summary_.dump());
     good({"report", folder});

@@ -1,7 +1,8 @@
 // node page_test.mjs PAGE.html OUTDIR
 // Drives a report page in a headless Chromium as a reader would, and checks what the page claims to have: the model,
 // its tetrahedra, pockets, comparisons, tables. Screenshots go to OUTDIR. Exit code 1 and a line for each failure.
-// Environment: VDBGEO_PAGE_MODULES is a node_modules folder with playwright-core; CHROMIUM is the browser.
+// Environment: VDBGEO_PAGE_MODULES is a node_modules folder with playwright-core; CHROMIUM is the browser;
+// VDBGEO_PAGE_DUST is set for a model whose pieces have but a pixel or two: edges and ranges may not show on these.
 import {mkdirSync, readFileSync, statSync, writeFileSync} from "node:fs";
 import {createRequire} from "node:module";
 import {resolve} from "node:path";
@@ -65,7 +66,8 @@ async function picture(page) {
   return read_png(await page.locator("#viewer .stage > canvas").first().screenshot());
 }
 
-async function changes(page, what, action, least = 0.002) {
+async function changes(page, what, action) {
+  const least = process.env.VDBGEO_PAGE_DUST && /^edges|^another range/.test(what) ? 0 : 0.002;
   const before = await picture(page);
   await action();
   const after = await picture(page);
@@ -258,7 +260,8 @@ async function check_dark() {
 async function check_without(what, prepare, file = address) {
   const page = await open({}, file, prepare);
   await page.waitForSelector("#viewer .viewer-note", {timeout: 20000}).catch(() => check(false, `a line says why ${what} is trouble`));
-  check(await page.locator("#viewer .poster").isVisible(), `the poster stays with ${what}`);
+  const poster = page.locator("#viewer .poster");
+  check(await poster.count() === 0 || await poster.isVisible(), `the poster stays with ${what}`);
   check(await page.locator("#viewer .stage").count() === 0 || !await page.locator("#viewer .stage").isVisible(), `no empty canvas with ${what}`);
   await page.context().close();
 }

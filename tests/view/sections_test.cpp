@@ -176,7 +176,7 @@ TEST(Sections, AFigureShowsContourAndDensityAtTheirPixels) {
     row.isovalue = 60.5;
     const Image figure = draw_section_figure({row}, options);
     ASSERT_EQ(figure.pixels.size(), plain.pixels.size());
-    // Where the contour is, its two neighbours are the voxels 60 and 61.
+    // Where the contour is, its two neighbours are the voxels 60 and 61. Below it the bar is marked too.
     int marked = 0;
     for (int y = 0; y < figure.height; ++y) {
         int first = -1, last = -1;
@@ -185,6 +185,7 @@ TEST(Sections, AFigureShowsContourAndDensityAtTheirPixels) {
                 if (first < 0) first = x;
                 last = x;
             }
+        if (first < 0 && marked > 0) break;
         if (first < 0) continue;
         ++marked;
         EXPECT_LE(last - first, 3);

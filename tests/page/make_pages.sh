@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes report pages of all sorts for the browser: make_pages.sh VDBGEO FOLDER
 #   model.html    of a real map (VDBGEO_DATA), else of a phantom
-#   torus.html     no pocket large enough
+#   bare.html     without pockets
 #   dust.html     a surface in ten thousand pieces
 #   aborted.html  a run that was broken off: no summary, half of the files
 set -eu
@@ -16,8 +16,8 @@ if [ ! -f "$map" ]; then
 fi
 model "$map" -o model --iso "$iso"
 
-"$vdbgeo" phantom torus torus.mrc --size 48 --quiet >/dev/null
-model torus.mrc -o torus --iso 0 --set pockets.min-area=1e9
+"$vdbgeo" phantom atpase bare.mrc --size 64 --quiet >/dev/null
+model bare.mrc -o bare --iso 0.5 --set pockets.min-area=1e9
 
 "$vdbgeo" phantom atpase noise.mrc --size 96 --snr 0.02 --seed 1 --quiet >/dev/null
 model noise.mrc -o dust --iso 2.3sigma --skip denoise --skip tets
@@ -26,4 +26,4 @@ mkdir aborted
 cp model/density.vdb model/smooth.vdb model/surface.ply model/slices_* model/density.svg aborted/
 "$vdbgeo" report aborted --quiet >/dev/null
 
-for page in model torus dust aborted; do mv "$page/report.html" "$page.html"; done
+for page in model bare dust aborted; do mv "$page/report.html" "$page.html"; done

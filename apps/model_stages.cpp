@@ -61,7 +61,7 @@ Lines picture_lines(const ModelState& m) {
             {"--labels", "marching cubes,remeshed", "--view", "iso", "--edges", "--zoom", "4"});
     if (m.on("curvature"))
         for (const auto& [property, file] : property_pictures)
-            add({m.fullest_mesh()}, file, {"--color-by", property});
+            add({m.fullest_mesh()}, file, {"--color-by", property, "--color-map", "diverging"});
     if (m.on("tets")) {
         const Words size{"--width", "800", "--occlusion", "4"};
         Words cut{"cutaway", m.at("tets.vtu"), m.at("cut.png")};

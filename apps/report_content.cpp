@@ -38,6 +38,7 @@ std::optional<double> number_of(const ReportFolder& folder, const std::vector<co
 struct Facts {
     std::string map_name, size, voxel;
     std::optional<double> isovalue, area_A2, volume_A3, pieces, tets;
+    bool open = false;  ///< the surface has a border
 };
 
 /// "100 × 100 × 100" and "2.7"; empty where the summary has no such lists.
@@ -68,6 +69,7 @@ Facts facts_of(const ReportFolder& folder) {
     f.area_A2 = number_of(folder, measured, "area_A2");
     f.volume_A3 = number_of(folder, measured, "volume_A3");
     f.pieces = number_of(folder, measured, "components");
+    f.open = number_of(folder, measured, "boundary_edges").value_or(0) > 0;
     f.tets = number_of(folder, {"tets"}, "tets");
     return f;
 }
@@ -107,6 +109,10 @@ std::vector<std::string> summary_text(const Facts& f, const std::vector<PocketRo
                              f.pieces ? fmt::format("; it consists of {} {}", number_text(*f.pieces),
                                                     *f.pieces == 1 ? "piece" : "pieces")
                                       : "");
+    if (f.area_A2 && !f.volume_A3 && f.open)
+        found +=
+            "It is open where the specimen meets the border of the map, so no volume is enclosed; the option "
+            "cap of the stage surface closes it there. ";
     if (!pockets.empty()) {
         const auto area = pockets[0].number("area_A2"), depth = pockets[0].number("depth_A");
         found +=
@@ -290,6 +296,7 @@ void add_own_measures(ReportContent& c, Facts& facts, const TriMesh& mesh, const
     facts.area_A2 = m.area_A2;
     facts.volume_A3 = m.volume_A3;
     facts.pieces = static_cast<double>(m.components);
+    facts.open = m.boundary_edges > 0;
     Json j{{"vertices", m.vertices},
            {"faces", m.faces},
            {"components", m.components},

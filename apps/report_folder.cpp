@@ -322,6 +322,8 @@ PageTerms ReportFolder::missing(bool within_run) const {
             list.emplace_back(s.title, "Switched off in this run.");
         else if (s.status == "failed")
             list.emplace_back(s.title, "Failed" + (s.error.empty() ? std::string(".") : ": " + s.error));
+        else if (s.status == "earlier")
+            list.emplace_back(s.title, "Not come to in this run: what is shown was left by an earlier one.");
         else
             list.emplace_back(s.title,
                               "Not done (" + s.status + ")" + (s.error.empty() ? "." : ": " + s.error));

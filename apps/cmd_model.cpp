@@ -23,6 +23,7 @@ struct PassedOn {
 struct ModelFlags {
     ModelOptions options;
     std::string config;
+    bool print_options = false;
     std::vector<std::string> set, skip;
     MapFlags map;
     IsoFlag iso;
@@ -65,6 +66,7 @@ void gather(ModelFlags& flags, const CLI::App& app) {
         if (!stage.empty() && !find_stage(stage))
             throw UsageError(fmt::format("{} {}: expected one of {}", flag, stage, stage_names()));
     if (o.in.empty()) throw UsageError("a map is needed, or --config with the summary of an earlier model");
+    if (o.folder.empty()) throw UsageError("a folder for the results is needed: -o DIR");
     if (o.in == "-") throw UsageError("-: a model is made of a file, not of a pipe");
     for (const char* stage : {"map", "surface"})
         if (o.sections().value(stage, Json(true)) == Json(false))
@@ -105,7 +107,7 @@ void say_summary(const Json& summary, const std::string& folder, Session& sessio
 void add_flags(CLI::App& app, ModelFlags& flags) {
     ModelOptions& o = flags.options;
     app.add_option("map", o.in, "Map (MRC, CCP4) or VDB grid; with --config SUMMARY that of the summary");
-    app.add_option("-o,--out", o.folder, "Folder for the results; made where it is not there")->required();
+    app.add_option("-o,--out", o.folder, "Folder for the results; made where it is not there");
     app.add_option("--preset", o.preset,
                    "What the map is: molecule (published, filtered), tomogram (raw, noisy) or label (a "
                    "segmentation)")

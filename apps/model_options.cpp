@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <sstream>
 
@@ -33,6 +34,36 @@ void check_section(const std::string& where, const std::string& stage, const Jso
         if (value.is_object() || value.is_null())
             throw InvalidInput(fmt::format("{}: {}.{} is {}; expected a number, a text, true, or an array",
                                            where, stage, key, value.dump()));
+}
+
+/// The position after blanks and comments (// and /* */) from `at` on.
+std::size_t past_blanks(const std::string& text, std::size_t at) {
+    while (at < text.size()) {
+        if (std::isspace(static_cast<unsigned char>(text[at])))
+            ++at;
+        else if (text.compare(at, 2, "//") == 0)
+            at = std::min(text.size(), text.find('\n', at));
+        else if (text.compare(at, 2, "/*") == 0 && text.find("*/", at) != std::string::npos)
+            at = text.find("*/", at) + 2;
+        else
+            break;
+    }
+    return at;
+}
+
+/// JSON without the commas that stand before a closing bracket: who comments options in and out should not
+/// have to count them.
+std::string without_trailing_commas(std::string text) {
+    for (std::size_t at = 0; (at = past_blanks(text, at)) < text.size(); ++at) {
+        if (text[at] == '"') {
+            for (++at; at < text.size() && text[at] != '"'; ++at)
+                if (text[at] == '\\') ++at;
+        } else if (text[at] == ',') {
+            const std::size_t next = past_blanks(text, at + 1);
+            if (next < text.size() && (text[next] == '}' || text[next] == ']')) text[at] = ' ';
+        }
+    }
+    return text;
 }
 
 std::string text_of(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
@@ -68,7 +99,7 @@ void read_config(const std::string& file, ModelOptions& options) {
     std::stringstream text;
     text << in.rdbuf();
     if (!in) throw IoError(fmt::format("{}: cannot be read", file));
-    Json all = Json::parse(text.str(), nullptr, false, true);
+    Json all = Json::parse(without_trailing_commas(text.str()), nullptr, false, true);
     if (!all.is_object())
         throw InvalidInput(fmt::format("{}: no JSON object of options; comments (//) are allowed", file));
     if (all.contains("stages") && all.contains("options")) {  // a summary

@@ -249,6 +249,28 @@ std::string stage_names() {
     return names;
 }
 
+std::string all_options_text() {
+    std::string text =
+        "// Options of vdbgeo model: take away the // before an option to set it. --config reads this file.\n"
+        "{\n    // \"preset\": \"molecule\",  // or tomogram, label\n";
+    const auto& stages = model_stages();
+    for (const ModelStage& stage : stages) {
+        text += fmt::format("    // {}: vdbgeo {}; false leaves it out\n    \"{}\": {{\n", stage.title,
+                            stage.command, stage.name);
+        CLI::App app;
+        find_command(stage.command).define(app);
+        for (const CLI::Option* option : app.get_options()) {
+            if (option->get_positional() || option->get_name() == "--help") continue;
+            const bool flag = option->get_items_expected_max() == 0;
+            const std::string given = option->get_default_str();
+            text += fmt::format("        // \"{}\": {},  // {}\n", option->get_name().substr(2),
+                                flag ? "true" : Json(given).dump(), option->get_description());
+        }
+        text += &stage == &stages.back() ? "    }\n" : "    },\n";
+    }
+    return text + "}\n";
+}
+
 void check_sections(const Json& sections) {
     for (const auto& [name, section] : sections.items()) {
         const ModelStage* stage = find_stage(name);

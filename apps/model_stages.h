@@ -52,6 +52,10 @@ const ModelStage* find_stage(const std::string& name);
 /// "map, denoise, …"
 std::string stage_names();
 
+/// A file of options that changes nothing: every option of every stage with its help and its default, as
+/// comments to take away.
+std::string all_options_text();
+
 /// UsageError, naming stage and option, where a section has an option that the stage's command does not know.
 void check_sections(const Json& sections);
 

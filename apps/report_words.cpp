@@ -64,8 +64,9 @@ std::string lower_first(std::string text) {
 
 /// Names of files, and what the page tells elsewhere.
 bool is_told_elsewhere(const std::string& key) {
-    static const std::vector<std::string> keys{"name",    "file",     "in",    "out",  "files",
-                                               "preview", "warnings", "notes", "list", "listed"};
+    static const std::vector<std::string> keys{
+        "name", "file", "in",      "out",   "files",    "preview",  "slices", "spectra", "histogram", "plane",
+        "plot", "mesh", "picture", "table", "metadata", "warnings", "notes",  "list",    "listed"};
     return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 

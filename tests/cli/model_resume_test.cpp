@@ -146,6 +146,23 @@ TEST_F(ModelRuns, AFileOfOptionsAndASummaryAreOptions) {
         EXPECT_TRUE(bytes(std::string("m/") + name) == bytes(std::string("again/") + name)) << name;
 }
 
+TEST_F(ModelRuns, AllOptionsArePrintedAsAFileThatChangesNothing) {
+    const std::string all = good({"model", "--print-options"}).out;
+    for (const char* text : {"\"remesh\": {", "// \"length\":", "in Å", "// \"threshold\":", "\"report\": {"})
+        EXPECT_NE(all.find(text), std::string::npos) << text;
+    const Json options = Json::parse(all, nullptr, false, true);
+    ASSERT_TRUE(options.is_object());
+    for (const auto& item : options.items()) EXPECT_TRUE(item.value().empty()) << item.key();
+    model({"--iso", "0"}, "plain");
+    model({"--iso", "0", "--config", make("all.json", all)}, "all");
+    expect_same_results("plain", "all");
+    // An option whose comment is taken away counts.
+    std::string one = all;
+    one.replace(one.find("// \"length\": \"\","), 15, "\"length\": 7,");
+    const Json set = model({"--iso", "0", "--config", make("one.json", one), "--to", "remesh"}, "one");
+    EXPECT_EQ(stage(set, "remesh")["result"]["length_A"], 7);
+}
+
 TEST_F(ModelRuns, WhatFailsIsToldAndTheRestIsThere) {
     const Ended r = vdbgeo(words(map_, {"--iso", "0", "--set", "curvature.map=" + at("none.mrc")}));
     EXPECT_EQ(r.code, 5);
@@ -184,6 +201,7 @@ TEST_F(ModelRuns, BadOptionsAreRefusedBeforeAnythingIsDone) {
     refused({"--config", make("c.json", R"({"remesh": 3})")}, 3, at("c.json"), "remesh");
     refused({"--config", at("none.json")}, 4, at("none.json"), "");
     expect_error(vdbgeo({"model", "-o", at("m")}), 2, "a map is needed");
+    expect_error(vdbgeo({"model", map_}), 2, "a folder");
 }
 
 TEST_F(ModelRuns, InterruptedItGoesOnWhereItWas) {

@@ -57,7 +57,11 @@ std::string rows_html(const PageTable& table, std::size_t begin, std::size_t end
             if (c == 0)
                 html += fmt::format("<th scope=\"row\"{}>{}</th>", number ? " class=\"number\"" : "", text);
             else
-                html += fmt::format("<td{}>{}</td>", number ? " class=\"number\"" : "", text);
+                html += fmt::format("<td{}>{}</td>",
+                                    !number             ? ""
+                                    : text.size() <= 48 ? " class=\"number\""
+                                                        : " class=\"number words\"",
+                                    text);
         }
         html += "</tr>\n";
     }

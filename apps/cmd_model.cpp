@@ -122,6 +122,8 @@ void add_flags(CLI::App& app, ModelFlags& flags) {
     app.add_option("--from", o.from,
                    "Begin with this stage and take what earlier ones left as it is: " + stage_names());
     app.add_option("--to", o.to, "End with this stage [report]");
+    app.add_flag("--print-options", flags.print_options,
+                 "Print a file for --config with every option, its default and what it does, and end");
     app.add_flag("--fresh", o.fresh, "Run every stage, also where nothing has changed since the last run");
     pass_on(app, flags, "surface", [&] { flags.iso.add(app); });
     pass_on(app, flags, "map", [&] {
@@ -151,6 +153,7 @@ Command model_command() {
             auto flags = std::make_shared<ModelFlags>();
             add_flags(app, *flags);
             return [flags, &app](Session& session) {
+                if (flags->print_options) return session.say(all_options_text());
                 gather(*flags, app);
                 const Json summary = run_model(flags->options, session);
                 if (!session.json) say_summary(summary, flags->options.folder, session);

@@ -80,7 +80,10 @@ class ModelRun {
 
 /// The summary of the last run, or an empty object: what cannot be read is not taken over.
 Json ModelRun::read_old() const {
-    std::ifstream in(state_.at("summary.json"), std::ios::binary);
+    const std::string path = state_.at("summary.json");
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return Json::object();
+    std::ifstream in(path, std::ios::binary);
     std::stringstream text;
     text << in.rdbuf();
     const Json old = Json::parse(text.str(), nullptr, false);
@@ -235,6 +238,9 @@ void ModelRun::run_stage(const ModelStage& stage, const ModelStage::Lines& lines
         failed("interrupted", e.what());
         throw;
     } catch (const UsageError& e) {
+        failed("failed", e.what());
+        throw;
+    } catch (const IoError& e) {  // a disk that is full for this stage is full for the next
         failed("failed", e.what());
         throw;
     } catch (const std::exception& e) {

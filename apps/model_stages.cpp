@@ -268,7 +268,7 @@ std::string all_options_text() {
         }
         text += &stage == &stages.back() ? "    }\n" : "    },\n";
     }
-    return text + "}\n";
+    return text + "}";
 }
 
 void check_sections(const Json& sections) {

@@ -87,6 +87,7 @@ class Session::Bar {
 };
 
 Progress Session::stage(const std::string& name) {
+    if (rehearsal_) throw Rehearsed();
     end_stage();
     bar_ = std::make_shared<Bar>(kept_ ? step_ + ": " + name : name, quiet, kept_ != nullptr);
     return Progress([bar = bar_](double fraction) { return bar->report(fraction); });
@@ -134,6 +135,13 @@ Session Session::step(const std::string& name, std::shared_ptr<Kept> kept) const
     session.threads = threads;
     session.step_ = name;
     session.kept_ = std::move(kept);
+    return session;
+}
+
+Session Session::rehearsal() {
+    Session session;
+    session.kept_ = std::make_shared<Kept>();
+    session.rehearsal_ = true;
     return session;
 }
 

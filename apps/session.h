@@ -59,6 +59,11 @@ class Session {
     };
     Session step(const std::string& name, std::shared_ptr<Kept> kept) const;
 
+    /// A session for a command that shall only look at its own command line, which all commands do before
+    /// their first stage: `stage` throws Rehearsed.
+    struct Rehearsed {};
+    static Session rehearsal();
+
     ~Session();
 
  private:
@@ -66,6 +71,7 @@ class Session {
     std::shared_ptr<Bar> bar_;
     std::string step_;            ///< name of the step, empty for a session of its own
     std::shared_ptr<Kept> kept_;  ///< of a step
+    bool rehearsal_ = false;
 };
 
 /// JSON as text; what is not UTF-8 in it (names of files can be anything) becomes U+FFFD.

@@ -12,7 +12,8 @@ namespace vdbgeo::app {
 /// The command of that name.
 Command find_command(const std::string& name);
 
-/// UsageError unless the command `words[0]` takes the other words. Runs nothing.
+/// UsageError unless the command `words[0]` takes the other words and finds sense in them. Reads no file that
+/// is not named as an option's value, and writes none.
 void check_words(const std::vector<std::string>& words);
 
 /// Runs a command line in this process and returns its result and its warnings. It throws what the command

@@ -158,19 +158,22 @@ TEST_F(ModelRuns, AllOptionsArePrintedAsAFileThatChangesNothing) {
     expect_same_results("plain", "all");
     // An option whose comment is taken away counts.
     std::string one = all;
-    one.replace(one.find("// \"length\": \"\","), 15, "\"length\": 7,");
+    const std::string off = "// \"length\": \"\",";
+    ASSERT_NE(one.find(off), std::string::npos);
+    one.replace(one.find(off), off.size(), "\"length\": 7,");
     const Json set = model({"--iso", "0", "--config", make("one.json", one), "--to", "remesh"}, "one");
     EXPECT_EQ(stage(set, "remesh")["result"]["length_A"], 7);
 }
 
 TEST_F(ModelRuns, WhatFailsIsToldAndTheRestIsThere) {
-    const Ended r = vdbgeo(words(map_, {"--iso", "0", "--set", "curvature.map=" + at("none.mrc")}));
+    const std::string odd = make("odd.mrc", "no map at all, but quite some text\n");
+    const Ended r = vdbgeo(words(map_, {"--iso", "0", "--set", "curvature.map=" + odd}));
     EXPECT_EQ(r.code, 5);
     EXPECT_NE(r.err.find("curvature, pockets failed"), std::string::npos) << r.err;
     const Json summary = read_summary();
     EXPECT_EQ(summary["status"], "failed");
     EXPECT_EQ(statuses(summary)["curvature"], "failed");
-    EXPECT_NE(stage(summary, "curvature")["error"].get<std::string>().find("none.mrc"), std::string::npos);
+    EXPECT_NE(stage(summary, "curvature")["error"].get<std::string>().find("odd.mrc"), std::string::npos);
     EXPECT_EQ(statuses(summary)["tets"], "done");
     EXPECT_EQ(statuses(summary)["pictures"], "done");
     EXPECT_TRUE(fs::exists(at("m/report.html")));

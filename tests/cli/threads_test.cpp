@@ -47,14 +47,21 @@ TEST_F(Threads, Model) {
     const std::string map = phantom("a.mrc", 48, {"--snr", "4"}, "virus");
     std::map<std::string, std::string> first;
     for (const char* threads : {"1", "2", "7"}) {
-        good({"model", map, "-o", at("m"), "--iso", "0.5", "--width", "200", "--occlusion", "2", "--threads",
-              threads});
+        good({"model", map, "-o", at("m"), "--iso", "0.5", "--width", "200", "--occlusion", "2", "--fresh",
+              "--threads", threads});
         std::map<std::string, std::string> found;
         for (const auto& entry : std::filesystem::directory_iterator(folder_ / "m"))
-            if (entry.path().filename() != "summary.json")  // tells the seconds
+            if (entry.path().filename() != "summary.json" && entry.path().filename() != "report.html")
                 found[entry.path().filename().string()] = read_bytes(entry.path());
         EXPECT_GE(found.size(), 3u);
         if (first.empty()) first = found;
         EXPECT_TRUE(found == first) << threads;
+    }
+    // Those two tell the seconds; a page of one and the same run does not change.
+    std::string page;
+    for (const char* threads : {"1", "2", "7"}) {
+        good({"report", at("m"), "-o", at("page.html"), "--threads", threads});
+        if (page.empty()) page = bytes("page.html");
+        EXPECT_TRUE(bytes("page.html") == page) << threads;
     }
 }

@@ -299,6 +299,30 @@ TEST(Hyperdiffusion, GivesTheSameBitsForAnyNumberOfThreads) {
     }
 }
 
+/// A body longer than a tile along z, that narrows along y: rows that fill a tile's memory lie beside rows
+/// that do not, and tiles lack leaves where the tile before had some.
+TEST(Hyperdiffusion, OfALongBodyStaysInItsRange) {
+    const auto grid = test::empty_grid();
+    auto to = grid->getAccessor();
+    test::SparseMaker make(7);
+    for (int x = -50; x <= 60; ++x)
+        for (int y = -75; y <= 75; ++y)
+            for (int z = -130; z <= 130; ++z)
+                if (x * x + y * y + 0.36 * z * z <= 75 * 75)
+                    to.setValueOn(Coord(x + 30, y + 35, z + 70), static_cast<float>(make.uniform()));
+    HyperdiffusionOptions o;
+    o.sigma = EdgeScale::parse("inf");
+    o.steps = 20;
+    o.min_cycles = 1;
+    for (const int order : {0, 1}) {
+        o.terms = {{order, 1.0}};
+        const auto smooth = grid->deepCopy();
+        const HyperdiffusionReport r = hyperdiffuse(*smooth, o);
+        EXPECT_NEAR(r.mean_after, r.mean_before, 1e-6);
+        for (auto it = smooth->cbeginValueOn(); it; ++it) ASSERT_TRUE(*it > 0 && *it < 1) << it.getCoord();
+    }
+}
+
 TEST(Hyperdiffusion, ScalesWithTheValues) {
     const auto input = test::sparse_grid("cells", 7);
     for (const double scale : {1e-8, 1e8})

@@ -46,10 +46,15 @@ inline void cut(Open& open, const RowSpan& row, int margin) {
     if (row.begin + margin > open.begin) open.begin = row.begin + margin;
     if (row.end - margin < open.end) open.end = row.end - margin;
 }
+inline bool fills_memory(const PlaneRange& range, int y) {
+    return range.spans[y].end - range.spans[y].begin == range.stride;
+}
 inline Open open_part(const PlaneRange& range, int y) {
     Open open{0, 1 << 20};
-    // A row that reaches to the end of its memory has its neighbours along z in the halo, which no one needs.
-    cut(open, range.spans[y], range.spans[y].end - range.spans[y].begin == range.stride ? 0 : 1);
+    // The neighbours along z of a row that reaches to the end of its memory are in the halo, which no one
+    // needs: where the next row in memory is active there, what comes out is some finite number.
+    const bool goes_on = fills_memory(range, y - 1) && fills_memory(range, y) && fills_memory(range, y + 1);
+    cut(open, range.spans[y], goes_on ? 0 : 1);
     if (open.end <= open.begin) return open;
     cut(open, range.spans[y - 1], 0);
     cut(open, range.spans[y + 1], 0);

@@ -1,0 +1,60 @@
+// Those who work on one thing together, each on a part of it: threads, or processes on several machines.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+namespace vdbgeo {
+
+/// Every member calls the same functions in the same order, each from one thread. What they agree on, and so
+/// what each of them goes on to do, depends on what all gave, in the order of their ranks, and on nothing
+/// else.
+///
+/// A member that throws takes all down: whoever runs the members has to see to that.
+class Team {
+ public:
+    virtual ~Team() = default;
+
+    virtual int size() const = 0;
+    virtual int rank() const = 0;
+
+    /// What every member gave, by rank.
+    virtual std::vector<std::vector<char>> gather(const std::vector<char>& mine) = 0;
+    /// Adds up, number by number, what all gave; all give equally many.
+    virtual void add_up(std::vector<std::uint64_t>& numbers) = 0;
+
+    /// Sends floats and returns at once. Messages of one tag from one member to another arrive in their
+    /// order.
+    virtual void send(int to, int tag, std::vector<float> data) = 0;
+
+    /// A message that is to come. It can begin to come as soon as it is expected.
+    class Incoming {
+     public:
+        virtual ~Incoming() = default;
+        /// Waits for it; once.
+        virtual std::vector<float> take() = 0;
+    };
+    virtual std::unique_ptr<Incoming> expect(int from, int tag, std::size_t count) = 0;
+
+    /// Lets messages move that are on their way: called now and then by who computes.
+    virtual void move_messages() {}
+};
+
+/// What every member gave, one behind the other, by rank.
+template <class T>
+std::vector<T> gather_all(Team& team, const std::vector<T>& mine) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    const auto* bytes = reinterpret_cast<const char*>(mine.data());
+    std::vector<T> all;
+    for (const std::vector<char>& part : team.gather({bytes, bytes + mine.size() * sizeof(T)})) {
+        const std::size_t before = all.size();
+        all.resize(before + part.size() / sizeof(T));
+        if (!part.empty()) std::memcpy(all.data() + before, part.data(), part.size());
+    }
+    return all;
+}
+
+}  // namespace vdbgeo

@@ -75,6 +75,17 @@ std::pair<int, int> parts_for(const CoordBBox& box, int members) {
     return best->second;
 }
 
+std::vector<CoordBBox> without_border(std::vector<CoordBBox> boxes) {
+    CoordBBox all;
+    for (const CoordBBox& box : boxes) all.expand(box);
+    for (CoordBBox& box : boxes)
+        for (int a = 0; a < 3; ++a) {
+            if (box.min()[a] == all.min()[a]) box.min()[a] = Coord::min()[a];
+            if (box.max()[a] == all.max()[a]) box.max()[a] = Coord::max()[a];
+        }
+    return boxes;
+}
+
 openvdb::FloatGrid::Ptr part_of(const openvdb::FloatGrid& grid, const CoordBBox& box) {
     openvdb::FloatGrid::ConstPtr source = grid.copy();
     if (grid.tree().hasActiveTiles()) {

@@ -44,7 +44,7 @@ std::vector<std::vector<BorderBlock>> by_member(const std::vector<BorderBlock>& 
     for (const BorderBlock& block : border)
         for (int side = 1; block.below >> side; ++side) {
             if (!(block.below >> side & 1)) continue;
-            auto& records = to[owner(boxes, block.block_below(side))];
+            auto& records = to.at(owner(boxes, block.block_below(side)));
             // Of several sides it may be the same member that lies below.
             if (records.empty() || records.back().origin != block.origin) records.push_back(block);
         }

@@ -38,9 +38,10 @@ class BlockSurface {
                       Filling& filling) const {
         kernels_.take_numbers(edges, first_vertex, side, filling.numbers);
     }
-    /// The vertices on the block's edges.
+    /// The vertices on the block's edges, of which there are some.
     void place_vertices(Filling& filling, const BlockCells& cells) const;
-    /// Its triangles, and the vertices inside its cells. The numbers around have to be taken.
+    /// Its triangles, of which there are some, and the vertices inside its cells. The numbers around have to
+    /// be taken.
     void make_triangles(Filling& filling, const BlockCells& cells, const cell::PatternId* patterns) const;
 
  private:

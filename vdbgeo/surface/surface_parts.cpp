@@ -261,9 +261,9 @@ void SurfacePart::Extraction::fill_blocks(std::size_t begin, std::size_t end, Su
     const auto triangle = [&](const BlockCells& c) {
         return out.triangles.data() + (c.triangle_place - first.triangle_place);
     };
-    // What follows is another task's.
-    filling.end_of_points = point(cells_[end])->data();
-    filling.end_of_triangles = triangle(cells_[end])->data();
+    // What follows is another task's. (Either array may be empty, and its address null.)
+    filling.end_of_points = reinterpret_cast<const float*>(point(cells_[end]));
+    filling.end_of_triangles = reinterpret_cast<VertexId*>(triangle(cells_[end]));
     // Smaller arrays may come from memory that the process has used before.
     constexpr std::size_t large = std::size_t{32} << 20;
     if ((behind.vertex_place - first.vertex_place) * sizeof(Vec3f) >= large)
@@ -277,7 +277,8 @@ void SurfacePart::Extraction::fill_blocks(std::size_t begin, std::size_t end, Su
         filling.points = point(cells);
         filling.triangles = triangle(cells);
         surface_.load(filling);
-        surface_.place_vertices(filling, cells);
+        if (cells.edge_vertices > 0) surface_.place_vertices(filling, cells);
+        if (cells.cells == 0) continue;
         take_numbers(filling);
         surface_.make_triangles(filling, cells, patterns);
         patterns += cells.cells;

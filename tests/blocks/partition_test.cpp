@@ -69,5 +69,26 @@ TEST(Partition, APartHasTheLeavesOfItsBox) {
     EXPECT_EQ(other->tree().leafCount(), 1u);
 }
 
+TEST(Partition, APartHasTheInactiveTilesThatTouchItsBox) {
+    auto grid = openvdb::FloatGrid::create(-1);
+    grid->tree().addTile(1, Coord(0, 24, 0), 5, false);
+    grid->tree().addTile(1, Coord(0, 40, 0), 5, false);
+    grid->tree().addTile(2, Coord(0, 128, 0), 7, false);
+    const auto part = part_of(*grid, {Coord(0), Coord(31)});
+    EXPECT_EQ(part->tree().getValue(Coord(7, 31, 0)), 5);
+    EXPECT_EQ(part->tree().getValue(Coord(7, 47, 0)), -1);
+    EXPECT_EQ(part->tree().getValue(Coord(0, 200, 0)), -1);
+    EXPECT_EQ(part->activeVoxelCount(), 0u);
+    EXPECT_EQ(part_of(*grid, {Coord(100), Coord(150)})->tree().getValue(Coord(0, 200, 0)), 7);
+}
+
+TEST(Partition, WithoutBorderEveryVoxelLiesInOneBox) {
+    const auto boxes = without_border(partition({Coord(-5, -40, 0), Coord(60, 130, 400)}, {3, 2}));
+    for (const Coord& at : {Coord(-1000, 0, 0), Coord(0, -5000, 130), Coord(0, 1 << 30, 0),
+                            Coord(5, 5, -9000), Coord(1 << 30, 64, 1 << 30), Coord(-5, -40, 0)})
+        EXPECT_EQ(std::count_if(boxes.begin(), boxes.end(), [&](const auto& b) { return b.isInside(at); }), 1)
+            << at;
+}
+
 }  // namespace
 }  // namespace vdbgeo

@@ -61,6 +61,22 @@ class ThreadTeam {
             team_.changed_.wait(lock, [&] { return team_.round_ != round; });
             return team_.all_;
         }
+        std::vector<std::vector<char>> exchange(const std::vector<std::vector<char>>& to) override {
+            const auto me = static_cast<std::size_t>(rank_);
+            {
+                const std::lock_guard<std::mutex> lock(team_.mutex_);
+                team_.letters_.resize(static_cast<std::size_t>(team_.size_));
+                team_.letters_[me] = to;
+            }
+            gather({});  // all have given
+            std::vector<std::vector<char>> mine;
+            {
+                const std::lock_guard<std::mutex> lock(team_.mutex_);
+                for (const auto& from : team_.letters_) mine.push_back(from[me]);
+            }
+            gather({});  // all have taken
+            return mine;
+        }
         void add_up(std::vector<std::uint64_t>& numbers) override {
             const std::vector<std::uint64_t> all = gather_all(*this, numbers);
             const std::size_t n = numbers.size();
@@ -106,6 +122,7 @@ class ThreadTeam {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::vector<char>> given_, all_;
+    std::vector<std::vector<std::vector<char>>> letters_;
     std::map<Key, std::deque<std::vector<float>>> mail_;
 };
 

@@ -23,6 +23,8 @@ class Team {
 
     /// What every member gave, by rank.
     virtual std::vector<std::vector<char>> gather(const std::vector<char>& mine) = 0;
+    /// Gives to[r] to each member r, and returns what each gave this one, by rank.
+    virtual std::vector<std::vector<char>> exchange(const std::vector<std::vector<char>>& to) = 0;
     /// Adds up, number by number, what all gave; all give equally many.
     virtual void add_up(std::vector<std::uint64_t>& numbers) = 0;
 
@@ -43,18 +45,42 @@ class Team {
     virtual void move_messages() {}
 };
 
-/// What every member gave, one behind the other, by rank.
+namespace detail {
+
 template <class T>
-std::vector<T> gather_all(Team& team, const std::vector<T>& mine) {
+std::vector<char> as_bytes(const std::vector<T>& records) {
     static_assert(std::is_trivially_copyable_v<T>);
-    const auto* bytes = reinterpret_cast<const char*>(mine.data());
+    const auto* bytes = reinterpret_cast<const char*>(records.data());
+    return {bytes, bytes + records.size() * sizeof(T)};
+}
+
+/// What lies in the parts, one behind the other.
+template <class T>
+std::vector<T> join(const std::vector<std::vector<char>>& parts) {
     std::vector<T> all;
-    for (const std::vector<char>& part : team.gather({bytes, bytes + mine.size() * sizeof(T)})) {
+    for (const std::vector<char>& part : parts) {
         const std::size_t before = all.size();
         all.resize(before + part.size() / sizeof(T));
         if (!part.empty()) std::memcpy(all.data() + before, part.data(), part.size());
     }
     return all;
+}
+
+}  // namespace detail
+
+/// What every member gave, one behind the other, by rank.
+template <class T>
+std::vector<T> gather_all(Team& team, const std::vector<T>& mine) {
+    return detail::join<T>(team.gather(detail::as_bytes(mine)));
+}
+
+/// What every member gave this one, one behind the other, by rank; to[r] goes to member r.
+template <class T>
+std::vector<T> exchange_all(Team& team, const std::vector<std::vector<T>>& to) {
+    std::vector<std::vector<char>> bytes;
+    bytes.reserve(to.size());
+    for (const std::vector<T>& records : to) bytes.push_back(detail::as_bytes(records));
+    return detail::join<T>(team.exchange(bytes));
 }
 
 }  // namespace vdbgeo

@@ -77,6 +77,7 @@ struct Outcome {
     std::vector<std::string> lines;
     std::string history;
     double removed = 0;
+    std::uint64_t bytes_sent = 0;  ///< by this member of a team to others
 };
 
 std::string noise_text(double noise) { return fmt::format("{:.4g} (estimated standard deviation)", noise); }
@@ -94,6 +95,7 @@ Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progres
     }
     Outcome out;
     out.removed = r.removed;
+    out.bytes_sent = r.bytes_sent;
     Json& j = out.numbers;
     j["order"] = orders;
     j["diffusivity"] = diffusivities;
@@ -186,7 +188,10 @@ void run_denoise_by_team(const DenoiseOptions& o, Session& session) {
     j.update(outcome.numbers);
     j["removed"] = outcome.removed;
     j.update(statistics_json(map.in.map.statistics));
+    std::vector<std::uint64_t> sent{outcome.bytes_sent};
+    session.team->add_up(sent);
     j["members"] = session.team->size();
+    j["bytes_sent"] = sent[0];
     write_by_team(o.files, map.in.map, map.share, j, session);
     seconds["write"] = clock.lap();
     j["seconds"] = seconds;

@@ -343,11 +343,11 @@ void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, c
         if (slab >= range.end_slab) return;
         const int n = sections_of(slab) * s.bin;
         if (any_order) {
+            const bool all_rows = range.first_row == 0 && range.end_row == all.end_row;
             const int row = range.first_row * leaf::dim,
-                      end = std::min(range.end_row * leaf::dim, s.count[1]);
-            const bool whole = range.first_row == 0 && range.end_row == all.end_row;
-            return s.ask_ahead(first_of(slab), n, whole ? 0 : s.first[1] + row * s.bin,
-                               whole ? static_cast<int>(s.layout.rows) : (end - row) * s.bin);
+                      rows = std::min(range.end_row * leaf::dim, s.count[1]) - row;
+            return s.ask_ahead(first_of(slab), n, all_rows ? 0 : s.first[1] + row * s.bin,
+                               all_rows ? static_cast<int>(s.layout.rows) : rows * s.bin);
         }
         into.resize(static_cast<std::uint64_t>(n) * s.layout.section_bytes);
         s.reader.read_raw_sections(into.data(), n);

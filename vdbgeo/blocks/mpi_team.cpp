@@ -50,14 +50,17 @@ class MpiRun::Members : public Team {
         MPI_Comm_size(MPI_COMM_WORLD, &size_);
         MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
         MPI_Comm_dup(MPI_COMM_WORLD, &failing);
+        MPI_Comm_dup(MPI_COMM_WORLD, &untagged);
     }
     ~Members() override {
         if (gave_up) return;
         for (Sent& s : sent_) MPI_Wait(&s.request, MPI_STATUS_IGNORE);
         MPI_Comm_free(&failing);
+        MPI_Comm_free(&untagged);
     }
 
-    MPI_Comm failing = MPI_COMM_NULL;  ///< where those meet that give up, whatever goes on elsewhere
+    MPI_Comm failing = MPI_COMM_NULL;   ///< where those meet that give up, whatever goes on elsewhere
+    MPI_Comm untagged = MPI_COMM_NULL;  ///< for the messages of exchange
     bool gave_up = false;
 
     int size() const override { return size_; }
@@ -77,6 +80,33 @@ class MpiRun::Members : public Team {
                           MPI_COMM_WORLD);
         }
         return all;
+    }
+
+    std::vector<std::vector<char>> exchange(const std::vector<std::vector<char>>& to) override {
+        const auto n = static_cast<std::size_t>(size_);
+        std::vector<std::uint64_t> give(n), take(n);
+        for (std::size_t r = 0; r < n; ++r) give[r] = to[r].size();
+        MPI_Alltoall(give.data(), 1, MPI_UINT64_T, take.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD);
+        std::vector<std::vector<char>> from(n);
+        std::vector<MPI_Request> requests;
+        const auto for_pieces = [&](std::uint64_t bytes, const auto& body) {
+            for (std::uint64_t at = 0; at < bytes; at += piece) {
+                requests.push_back(MPI_REQUEST_NULL);
+                body(at, count_of(std::min<std::uint64_t>(piece, bytes - at)), &requests.back());
+            }
+        };
+        for (std::size_t r = 0; r < n; ++r) {
+            from[r].resize(take[r]);
+            for_pieces(take[r], [&](std::uint64_t at, int count, MPI_Request* request) {
+                MPI_Irecv(from[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0, untagged, request);
+            });
+        }
+        for (std::size_t r = 0; r < n; ++r)
+            for_pieces(give[r], [&](std::uint64_t at, int count, MPI_Request* request) {
+                MPI_Isend(to[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0, untagged, request);
+            });
+        MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+        return from;
     }
 
     void add_up(std::vector<std::uint64_t>& numbers) override {

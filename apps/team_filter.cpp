@@ -21,23 +21,30 @@ openvdb::CoordBBox box_of(const Frame& frame) {
     return {openvdb::Coord(0), openvdb::Coord(frame.size.x(), frame.size.y(), frame.size.z()).offsetBy(-1)};
 }
 
-/// Returns once all members have come here.
-void wait_for_all(Team& team) { gather_all(team, std::vector<char>{}); }
-
 fs::path folder_of_parts(const std::string& out) {
     return has_ending(out, ".parts") ? fs::path(out) : fs::path(out + ".parts");
 }
 
 }  // namespace
 
-MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session) {
+void wait_for_all(Team& team) { gather_all(team, std::vector<char>{}); }
+
+MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session) {
     Team& team = *session.team;
-    const openvdb::CoordBBox box = box_of(map_frame(flags.in, flags.map.options));
+    const openvdb::CoordBBox box = box_of(map_frame(in, options));
     MapOfTeam map;
     map.share = {&team, partition(box, parts_for(box, team.size())), halo};
     const MapPart part{&team, map.share.own(), map.share.with_ghosts(team.rank())};
-    map.in = read_map_part(flags.in, flags.map.options, part, session.stage("reading"));
-    const Moments kept = active_moments(*map.in.map.grid, {&team, map.share.own()});
+    map.in = read_map_part(in, options, part, session.stage("reading"));
+    for (const std::string& w : map.in.warnings) session.warn(in + ": " + w);
+    if (!session.json && !session.quiet)
+        for (const std::string& note : map.in.notes) session.say(in + ": " + note);
+    return map;
+}
+
+MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session) {
+    MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
+    const Moments kept = active_moments(*map.in.map.grid, {session.team, map.share.own()});
     if (kept.non_finite > 0)
         throw InvalidInput(fmt::format(
             "{}: {} of the samples are not finite numbers; --threshold or --mask can leave them out",
@@ -46,9 +53,6 @@ MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session)
         throw NumericalError(fmt::format(
             "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
             flags.in, map.in.map.statistics.min, map.in.map.statistics.max));
-    for (const std::string& w : map.in.warnings) session.warn(flags.in + ": " + w);
-    if (!session.json && !session.quiet)
-        for (const std::string& note : map.in.notes) session.say(flags.in + ": " + note);
     return map;
 }
 

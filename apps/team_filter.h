@@ -17,8 +17,13 @@ struct MapOfTeam {
 };
 
 /// Shares out the map among the session's team and reads this member's part, with ghosts `halo` voxels wide.
-/// Checks and messages as read_for_filter.
+/// Says what is odd about it.
+MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session);
+/// The same with the checks of read_for_filter.
 MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session);
+
+/// Returns once all members have come here.
+void wait_for_all(Team& team);
 
 /// Makes the statistics, the metadata and the history those of the new values of all parts.
 void finish_map(DensityMap& map, const std::string& history, const stencil::Share& share);

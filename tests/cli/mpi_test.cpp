@@ -96,6 +96,18 @@ TEST_F(Mpi, LeavesPartsThatMerge) {
     EXPECT_FALSE(fs::exists(at("bad.mrc")));
 }
 
+TEST_F(Mpi, ExtractsTheSameSurface) {
+    const std::string map = noisy();
+    expect_same({"surface", map, "--iso", "1.5sigma"}, ".ply", {1, 2, 4, 5});
+    good({"convert", map, at("a.vdb"), "--threshold", "0.5", "--quiet"});
+    expect_same({"surface", at("a.vdb"), "--iso", "0.7"}, ".ply", {3});
+    const Ended r = mpi(2, {"surface", map, at("b.ply"), "--iso", "1", "--json"});
+    const Json told = Json::parse(r.out, nullptr, false),
+               alone = json({"surface", map, at("c.ply"), "--iso", "1"});
+    for (const char* key : {"vertices", "faces", "iso", "method"}) EXPECT_EQ(told[key], alone[key]) << key;
+    EXPECT_FALSE(fs::exists(at("b.ply.unfinished")));
+}
+
 TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {
     const std::string map = phantom("a.mrc", 40);
     const auto expect = [&](int processes, const Words& words, int code, const std::string& text) {
@@ -113,6 +125,9 @@ TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {
     expect(2, {"denoise", map, at("none/b.mrc")}, 4, "there is no folder");
     expect(7, {"denoise", map, at("b.mrc")}, 3, "cannot be shared out to 7");
     expect(2, {"denoise", map, at("b.mrc"), "--threshold", "1e9"}, 5, "no sample is kept");
+    expect(2, {"surface", map, at("b.ply"), "--iso", "1e9"}, 5, "no surface at the isovalue");
+    expect(2, {"surface", map, at("b.ply"), "--iso", "otsu"}, 2, "a team takes a density");
+    expect(2, {"surface", map, at("b.stl"), "--iso", "0"}, 2, "a team writes .ply");
     EXPECT_EQ(listing(), std::set<std::string>{"a.mrc"});
 }
 

@@ -13,6 +13,8 @@ class Mpi : public Cli {
  protected:
     void SetUp() override {
         if (sanitized) GTEST_SKIP() << "NOT TESTED: mpirun and sanitizers do not go together";
+        const Ended probe = mpi(2, {"denoise", "--help"});
+        if (probe.code != 0) GTEST_SKIP() << "NOT TESTED: mpirun starts no processes here: " << probe.err;
     }
 
     /// mpirun with so many processes of so many threads.

@@ -12,12 +12,16 @@
 #include "apps/render_slices.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/team_filter.h"
 #include "vdbgeo/flow/baselines.h"
 #include "vdbgeo/flow/noise.h"
 #include "vdbgeo/volume/map_statistics.h"
 
 namespace vdbgeo::app {
 namespace {
+
+struct DenoiseOptions;
+void check_for_team(const DenoiseOptions& o);
 
 struct DenoiseOptions {
     MapFilterFlags files;
@@ -52,7 +56,7 @@ void DenoiseOptions::check_flags() const {
 void DenoiseOptions::finish(Session& session) {
     files.finish();
     check_flags();
-    check_map_output(files.out, session);
+    if (!(session.team && has_ending(files.out, ".parts"))) check_map_output(files.out, session);
     check_plot_output(spectra);
     plots.check(!spectra.empty(), "--spectra");
     check_folder_of(slices);
@@ -64,6 +68,7 @@ void DenoiseOptions::finish(Session& session) {
         diffusion.orders = "0";
     }
     diffusion.finish();
+    if (session.team) check_for_team(*this);
 }
 
 /// What was chosen and done, for the result and in words; what is empty or null does not apply.
@@ -72,13 +77,16 @@ struct Outcome {
     std::vector<std::string> lines;
     std::string history;
     double removed = 0;
+    std::uint64_t bytes_sent = 0;  ///< by this member of a team to others
 };
 
 std::string noise_text(double noise) { return fmt::format("{:.4g} (estimated standard deviation)", noise); }
 
-Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress) {
+Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress,
+                const stencil::Share* share = nullptr) {
     const HyperdiffusionOptions& options = o.diffusion.options;
-    const HyperdiffusionReport r = naming(o.files.in, [&] { return hyperdiffuse(grid, options, progress); });
+    const HyperdiffusionReport r =
+        naming(o.files.in, [&] { return hyperdiffuse(grid, options, progress, share); });
     std::vector<int> orders;
     std::vector<double> diffusivities;
     for (const DiffusionTerm& term : options.terms) {
@@ -87,6 +95,7 @@ Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progres
     }
     Outcome out;
     out.removed = r.removed;
+    out.bytes_sent = r.bytes_sent;
     Json& j = out.numbers;
     j["order"] = orders;
     j["diffusivity"] = diffusivities;
@@ -154,7 +163,44 @@ void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Sessi
     session.say(fmt::format("voxels      {}", j["active_voxels"].get<std::uint64_t>()));
 }
 
+void check_for_team(const DenoiseOptions& o) {
+    check_team_output(o.files);
+    check_folder_of(o.files.out);
+    if (!o.diffuses()) throw UsageError(fmt::format("--method {}: a team runs hyperdiffusion", o.method));
+    for (const auto& [flag, value] : {std::pair("--spectra", o.spectra), {"--slices", o.slices}})
+        if (!value.empty()) throw UsageError(fmt::format("{}: a team draws no pictures", flag));
+}
+
+/// Every member denoises its part.
+void run_denoise_by_team(const DenoiseOptions& o, Session& session) {
+    Json seconds;
+    Clock clock;
+    MapOfTeam map = read_for_team(o.files, hyperdiffusion_halo(o.diffusion.options), session);
+    need_density(o.files.in, map.in);
+    seconds["read"] = clock.lap();
+    const MapShare all{session.team, map.share.own()};
+    const double rms_before = active_moments(*map.in.map.grid, all).statistics().rms;
+    const Outcome outcome = diffuse(o, *map.in.map.grid, session.stage("denoising"), &map.share);
+    finish_map(map.in.map, fmt::format("denoised: {}, {}", o.method, outcome.history), map.share);
+    seconds["compute"] = clock.lap();
+    Json j = filter_result(o.files, map.in);
+    j["method"] = o.method;
+    j.update(outcome.numbers);
+    j["removed"] = outcome.removed;
+    j.update(statistics_json(map.in.map.statistics));
+    std::vector<std::uint64_t> sent{outcome.bytes_sent};
+    session.team->add_up(sent);
+    j["members"] = session.team->size();
+    j["bytes_sent"] = sent[0];
+    write_by_team(o.files, map.in.map, map.share, j, session);
+    seconds["write"] = clock.lap();
+    j["seconds"] = seconds;
+    say_outcome(outcome, j, rms_before, session);
+    session.result(j);
+}
+
 void run_denoise(const DenoiseOptions& o, Session& session) {
+    if (session.team) return run_denoise_by_team(o, session);
     Json seconds;
     Clock clock;
     const double state = o.diffuses() ? 20.2 : 16.4;  // bytes a voxel: grid and fields

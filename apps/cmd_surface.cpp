@@ -9,7 +9,11 @@
 #include "apps/mesh_command.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/team_filter.h"
 #include "converters/mesh_file.h"
+#include "converters/mesh_pieces.h"
+#include "vdbgeo/blocks/team_marching_cubes.h"
+#include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/label_surfaces.h"
 
 namespace vdbgeo::app {
@@ -108,6 +112,85 @@ void run_surface(const SurfaceOptions& o, Session& session) {
            {fmt::format("isovalue    {:.6g} ({})", surface.isovalue, rule.text())}, seconds, clock, session);
 }
 
+void check_for_team(const SurfaceOptions& o, const Isovalue& rule) {
+    if (!has_ending(o.out, ".ply")) throw UsageError(o.out + ": a team writes .ply");
+    check_folder_of(o.out);
+    if (o.surface.method != "marching-cubes" || o.surface.cap)
+        throw UsageError("a team runs marching cubes, without --cap");
+    if (o.components.any() || o.split || !o.labels.empty())
+        throw UsageError(
+            "pieces and labels: a team writes the surface whole; vdbgeo components takes it apart");
+    if (rule.needs_samples())
+        throw UsageError("--iso: a team takes a density, a number of sigmas, record:FILE or auto");
+}
+
+/// Every member extracts the surface in its part and puts it where it belongs in the one file.
+void run_surface_by_team(const SurfaceOptions& o, Session& session) {
+    const Isovalue rule = o.iso.parse();
+    check_for_team(o, rule);
+    Team& team = *session.team;
+    Json seconds;
+    Clock clock;
+    const MapOfTeam map = read_for_team(o.in, o.map.options, leaf::dim, session);
+    seconds["read"] = clock.lap();
+    const DensityMap& part = map.in.map;
+    const TeamSurface surface = naming(o.in, [&] {
+        MarchingCubesOptions options;
+        options.isovalue = rule.resolve(part.statistics, part.grid->getGridClass());
+        if (map.in.level_set) options.isovalue = -options.isovalue;
+        return team_marching_cubes(map.in.level_set ? turned_over(part) : part, options, map.share,
+                                   session.stage("surface"));
+    });
+    const double iso = rule.resolve(part.statistics, part.grid->getGridClass());
+    if (surface.triangles == 0)
+        throw NumericalError(
+            fmt::format("{}: no surface at the isovalue {:.6g}: the map's values lie between {:.6g} and "
+                        "{:.6g}; try another --iso",
+                        o.in, iso, part.statistics.min, part.statistics.max));
+    seconds["compute"] = clock.lap();
+    const Progress progress = session.stage("writing");
+    const std::string unfinished = o.out + ".unfinished";
+    std::error_code error;
+    if (team.rank() == 0) std::filesystem::remove(unfinished, error);
+    wait_for_all(team);
+    PlyPieces file(unfinished, surface.vertices, surface.triangles);
+    if (team.rank() == 0) file.put_header();
+    const Vec3f* points = surface.piece.points.data();
+    for (const SurfaceRun& run : surface.piece.point_runs) {
+        file.put_points(run.first, points, run.count);
+        points += run.count;
+    }
+    const Triangle* triangles = surface.piece.triangles.data();
+    for (const SurfaceRun& run : surface.piece.triangle_runs) {
+        file.put_triangles(run.first, triangles, run.count);
+        triangles += run.count;
+        progress.report(0.5);
+    }
+    file.close();
+    wait_for_all(team);
+    if (team.rank() == 0) {
+        std::filesystem::rename(unfinished, o.out, error);
+        if (error) throw IoError(fmt::format("{}: cannot be written: {}", o.out, error.message()));
+    }
+    wait_for_all(team);
+    session.end_stage();
+    seconds["write"] = clock.lap();
+    std::vector<std::uint64_t> sent{surface.bytes_sent};
+    team.add_up(sent);
+    if (!session.json) {
+        session.say(fmt::format("isovalue    {:.6g} ({})", iso, rule.text()));
+        session.say(fmt::format("surface     {} vertices, {} faces", surface.vertices, surface.triangles));
+    }
+    session.result({{"vertices", surface.vertices},
+                    {"faces", surface.triangles},
+                    {"iso", iso},
+                    {"iso_rule", rule.text()},
+                    {"method", o.surface.method},
+                    {"members", team.size()},
+                    {"bytes_sent", sent[0]},
+                    {"seconds", seconds}});
+}
+
 }  // namespace
 
 Command surface_command() {
@@ -142,7 +225,7 @@ Command surface_command() {
                     }
                     check_usage(o->components.filter);
                     check_usage(o->label_options);
-                    run_surface(*o, session);
+                    session.team ? run_surface_by_team(*o, session) : run_surface(*o, session);
                 };
             }};
 }

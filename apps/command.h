@@ -45,9 +45,22 @@ Command report_command();
 /// Every command, in the order of the help.
 std::vector<Command> all_commands();
 
+Command merge_command();
+
+/// The commands that a team can run.
+std::vector<Command> team_commands();
+
+/// What a member of a team needs beside its part.
+struct TeamRun {
+    Team* team = nullptr;
+    /// Ends all members with this exit code; the one that has the word calls `say`.
+    std::function<void(int code, const std::function<void()>& say)> fail;
+};
+
 /// Runs `vdbgeo` with all commands, or, with `only` set, a program that is that one command under another
 /// name. Returns the exit code: 0 done, 2 usage, 3 bad input, 4 reading or writing failed, 5 the computation
 /// failed, 130 interrupted.
-int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single);
+int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single,
+        const TeamRun& team = {});
 
 }  // namespace vdbgeo::app

@@ -29,10 +29,12 @@ void add_common_flags(CLI::App& app, Session& session) {
 }
 
 /// Runs a command's body and turns what it throws into an exit code and one line.
-int guarded(Session& session, const std::function<void(Session&)>& body) {
+int guarded(Session& session, const std::function<void(Session&)>& body, const TeamRun& team) {
     const auto failed = [&](int code, const std::string& message) {
         session.drop_stage();
-        return fail(session.program, code, message);
+        const auto say = [&] { fail(session.program, code, message); };
+        team.fail ? team.fail(code, say) : say();
+        return code;
     };
     try {
         std::optional<tbb::global_control> limit;
@@ -69,17 +71,21 @@ std::vector<Command> all_commands() {
             remesh_command(),         simplify_command(),   smooth_command(),    repair_command(),
             measure_command(),        components_command(), curvature_command(), pockets_command(),
             tetrahedralize_command(), cutaway_command(),    validate_command(),  render_command(),
-            model_command(),          report_command()};
+            model_command(),          report_command(),     merge_command()};
 }
 
-int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program,
-        bool single) {
+std::vector<Command> team_commands() { return {denoise_command(), surface_command()}; }
+
+int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single,
+        const TeamRun& team) {
     install_interrupt_handler();
     CLI::App app(single ? commands[0].summary : "Geometric modelling of cryo-EM maps and tomograms", program);
     app.set_version_flag("--version", [] { return versions_text(); });
     app.get_formatter()->column_width(34);
     Session session;
     session.program = program;
+    session.team = team.team;
+    const bool has_the_word = !team.team || team.team->rank() == 0;
     std::function<void(Session&)> chosen;
     if (single) {
         add_common_flags(app, session);
@@ -100,13 +106,16 @@ int run(int argc, char** argv, const std::vector<Command>& commands, const std::
     try {
         app.parse(argc, argv);
     } catch (const CLI::Success& e) {
-        return app.exit(e);  // --help, --version
+        return has_the_word ? app.exit(e) : 0;  // --help, --version
     } catch (const CLI::ParseError& e) {
+        if (!has_the_word) return exit_usage;
         return fail(program, exit_usage, fmt::format("{}; {} --help tells more", e.what(), program));
     }
+    if (!chosen && !has_the_word) return exit_usage;
     if (!chosen)
         return fail(program, exit_usage, fmt::format("a command is needed; {} --help lists them", program));
-    return guarded(session, chosen);
+    if (!has_the_word) session.silence();
+    return guarded(session, chosen, team);
 }
 
 }  // namespace vdbgeo::app

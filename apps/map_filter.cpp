@@ -112,6 +112,10 @@ void need_density(const std::string& name, const MapFile& in) {
 
 void finish_map(DensityMap& map, const std::string& history) {
     map.statistics = statistics_of(map);
+    note_new_values(map, history);
+}
+
+void note_new_values(DensityMap& map, const std::string& history) {
     if (map.grid->getMetadata<openvdb::Int32Metadata>("mrc_mode"))
         set_metadata(*map.grid, "mrc_mode", std::int32_t(2));  // whole numbers do not hold the new values
     store_frame(map);

@@ -41,7 +41,10 @@ MapFile read_for_filter(const MapFilterFlags& flags, const MemoryNeed& need, Ses
 /// InvalidInput for a level set, which is no density.
 void need_density(const std::string& name, const MapFile& in);
 
-/// Makes the statistics, the metadata and the history of a map those of its new values.
+/// Makes metadata and history of a map, whose statistics are known, those of its new values.
+void note_new_values(DensityMap& map, const std::string& history);
+
+/// The same, and the statistics too.
 void finish_map(DensityMap& map, const std::string& history);
 
 /// Writes the map and puts what there is to say of the file into the result.

@@ -145,6 +145,11 @@ Session Session::rehearsal() {
     return session;
 }
 
+void Session::silence() {
+    quiet = true;
+    kept_ = std::make_shared<Kept>();
+}
+
 Session::~Session() { end_stage(); }
 
 std::string json_text(const Json& value, int indent) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vdbgeo/core/progress.h"
+#include "vdbgeo/core/team.h"
 
 namespace vdbgeo::app {
 
@@ -36,6 +37,7 @@ class Session {
     bool json = false;               ///< one JSON object on standard output, all else on standard error
     bool quiet = false;              ///< no progress
     int threads = 0;                 ///< 0: as many as there are
+    Team* team = nullptr;            ///< of a run on several machines: each member has a part of the map
     bool output_taken = false;  ///< a file goes to standard output: lines for people go to standard error
 
     /// Progress of one stage: a bar with rate and time left on a terminal, else one line when it ends.
@@ -63,6 +65,9 @@ class Session {
     /// their first stage: `stage` throws Rehearsed.
     struct Rehearsed {};
     static Session rehearsal();
+
+    /// Nothing is printed any more: for the members of a team that have not the word.
+    void silence();
 
     ~Session();
 

@@ -8,6 +8,9 @@ set_target_properties(vdbgeo_view PROPERTIES EXPORT_NAME view)
 install(TARGETS vdbgeo vdbgeo_converters vdbgeo_view EXPORT vdbgeoTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS vdbgeo_main mrc2vdb vdb2mrc RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+if(VDBGEO_MPI_FOUND)
+  install(TARGETS vdbgeo_mpi_main RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
 install(DIRECTORY vdbgeo converters DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(EXPORT vdbgeoTargets NAMESPACE vdbgeo:: DESTINATION ${_package_folder})
 

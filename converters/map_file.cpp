@@ -16,21 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What read_map and stream_map do alike once the samples are sorted.
-MapFile finish(MapPasses& passes, DensityMap&& map) {
-    MapFile result;
-    result.map = std::move(map);
-    result.warnings = passes.source().warnings();
-    if (result.map.statistics.non_finite > 0)
-        result.warnings.push_back(fmt::format("{} samples are not finite numbers; they count as empty",
-                                              result.map.statistics.non_finite));
-    passes.store_metadata(*result.map.grid);
-    add_history(*result.map.grid, passes.history());
-    result.quantisation = passes.sparsify().quantisation;
-    result.notes = passes.notes();
-    return result;
-}
-
 MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     MapPasses passes(path, options);
     const double before = 1 - 1.0 / passes.passes();
@@ -45,9 +30,10 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
                     slab.clear();
                 },
                 progress.part(before, 1));
-    DensityMap map = builder.finish(passes.source().frame());
-    MapFile result = finish(passes, std::move(map));
+    MapFile result;
+    result.map = builder.finish(passes.source().frame());
     result.rounding = builder.totals().rounding();
+    finish_map_file(passes, result);
     return result;
 }
 
@@ -91,6 +77,17 @@ std::string lower_case(std::string text) {
 }
 
 }  // namespace
+
+void finish_map_file(MapPasses& passes, MapFile& result) {
+    result.warnings = passes.source().warnings();
+    if (result.map.statistics.non_finite > 0)
+        result.warnings.push_back(fmt::format("{} samples are not finite numbers; they count as empty",
+                                              result.map.statistics.non_finite));
+    passes.store_metadata(*result.map.grid);
+    add_history(*result.map.grid, passes.history());
+    result.quantisation = passes.sparsify().quantisation;
+    result.notes = passes.notes();
+}
 
 MapFile read_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     options.check();
@@ -142,12 +139,12 @@ MapFile stream_map(const fs::path& path, const MapReadOptions& options, const Vd
                 fmt::format("{}: the background {} is too large for 16-bit floats; give another --background",
                             path.string(), background));
     }
-    DensityMap map;
-    map.grid = std::make_shared<StreamedGrid>(leaves, background);
-    map.frame = passes.source().frame();
-    map.statistics = totals.statistics();
-    store_frame(map);
-    MapFile result = finish(passes, std::move(map));
+    MapFile result;
+    result.map.grid = std::make_shared<StreamedGrid>(leaves, background);
+    result.map.frame = passes.source().frame();
+    result.map.statistics = totals.statistics();
+    store_frame(result.map);
+    finish_map_file(passes, result);
     result.rounding = totals.rounding();
     result.half_error = leaves->half_error();
     if (leaves->spilled() > 0)

@@ -2,6 +2,7 @@
 // samples.
 #pragma once
 
+#include "converters/map_file.h"
 #include "converters/strip_source.h"
 
 namespace vdbgeo {
@@ -63,6 +64,9 @@ class MapPasses {
     std::unique_ptr<StripSorter> sorter_;
     std::uint64_t despeckled_ = 0;
 };
+
+/// Warnings, notes and metadata of a map whose samples are sorted.
+void finish_map_file(MapPasses& passes, MapFile& result);
 
 template <class Pack, class Take>
 void MapPasses::sort(const Pack& pack, const Take& take, const Progress& progress) {

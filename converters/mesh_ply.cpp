@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "converters/mesh_formats.h"
+#include "converters/mesh_pieces.h"
 #include "converters/mesh_properties.h"
 #include "converters/text_cursor.h"
 #include "vdbgeo/core/errors.h"
@@ -375,16 +376,9 @@ TriMesh read_ply(const MappedFile& file, const Progress& progress) {
 }
 
 void write_ply(const TriMesh& mesh, const Output& out) {
-    std::string header = "ply\nformat binary_little_endian 1.0\ncomment vdbgeo, coordinates in Angstrom\n";
-    header += fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
-                          mesh.points.size());
-    header += declare(mesh.vertex_properties, {"x", "y", "z"}, out.name);
-    // Many readers know int only.
-    const char* const index = mesh.points.size() > 0x80000000ull ? "uint" : "int";
-    header +=
-        fmt::format("element face {}\nproperty list uchar {} vertex_indices\n", mesh.triangles.size(), index);
-    header += declare(mesh.face_properties, {"vertex_indices", "vertex_index"}, out.name);
-    out.file.write(header + "end_header\n");
+    out.file.write(ply_header(mesh.points.size(), mesh.triangles.size(),
+                              declare(mesh.vertex_properties, {"x", "y", "z"}, out.name),
+                              declare(mesh.face_properties, {"vertex_indices", "vertex_index"}, out.name)));
     write_elements(out.file, mesh.points.size(), out.progress.part(0, 0.5),
                    [&](std::size_t i, Buffer& buffer) {
                        for (const float c : mesh.points[i]) put(buffer, c);

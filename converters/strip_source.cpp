@@ -72,6 +72,7 @@ struct StripSource::State {
         count{};  // along columns, rows, sections: where the crop begins; samples handed out
     Frame frame;
     std::vector<std::string> warnings;
+    std::optional<Range> range;
     bool unpack_first = false;
     std::filesystem::path unpack_to;
     std::optional<ScratchFile> unpacked;
@@ -91,7 +92,7 @@ struct StripSource::State {
     std::uint64_t position(std::uint64_t section, std::uint64_t row) const {
         return (unpacked ? 0 : layout.data_start) + section * layout.section_bytes + row * layout.row_bytes;
     }
-    void ask_ahead(int section, int sections) const;
+    void ask_ahead(int section, int sections, int row, int rows) const;
     const unsigned char* rows(const Bytes* slab, int slab_first, int section, int row, int n, Bytes& space,
                               std::size_t at) const;
     Strip strip(const Bytes* slab, int slab_first, int section, int sections, int row, int rows_wanted,
@@ -152,11 +153,15 @@ void StripSource::State::unpack(const Progress& progress) {
     }
 }
 
-/// Tells the system which sections are wanted next, so that the disk works while we do.
-void StripSource::State::ask_ahead(int section, int sections) const {
+/// Tells the system which rows of which sections are wanted next, so that the disk works while we do.
+void StripSource::State::ask_ahead(int section, int sections, int row, int rows) const {
+    const bool whole = static_cast<std::uint64_t>(rows) * layout.row_bytes == layout.section_bytes;
     const std::uint64_t begin = static_cast<std::uint64_t>(section), n = static_cast<std::uint64_t>(sections);
-    ::posix_fadvise(descriptor(), static_cast<off_t>(position(begin, 0)),
-                    static_cast<off_t>(n * layout.section_bytes), POSIX_FADV_WILLNEED);
+    for (std::uint64_t i = 0; i < (whole ? 1 : n); ++i)
+        ::posix_fadvise(
+            descriptor(), static_cast<off_t>(position(begin + i, static_cast<std::uint64_t>(row))),
+            static_cast<off_t>((whole ? n : 1) * static_cast<std::uint64_t>(rows) * layout.row_bytes),
+            POSIX_FADV_WILLNEED);
 }
 
 /// `n` rows of a section as they are in the file: out of the slab that was unpacked, or read into `space`.
@@ -311,6 +316,8 @@ std::vector<std::string> StripSource::warnings() const {
     return all;
 }
 
+void StripSource::restrict_to(const Range& range) { state_->range = range; }
+
 void StripSource::scale(double shift, double factor) {
     state_->shift = shift;
     state_->factor = factor;
@@ -323,28 +330,35 @@ void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, c
     const bool unpack = s.unpack_first && !s.unpacked;
     if (unpack) s.unpack(whole.part(0, 0.7));
     const Progress progress = whole.part(unpack ? 0.7 : 0, 1);
-    const int sections = s.count[2], slabs = (sections - 1) / height + 1,
-              strips = (s.count[1] - 1) / leaf::dim + 1;
-    if (group <= 0) group = strips;
+    const int sections = s.count[2];
+    const Range all{0, (s.count[1] - 1) / leaf::dim + 1, 0, (sections - 1) / height + 1},
+        range = s.range.value_or(all);
+    if (group <= 0) group = all.end_row;
     const bool any_order = s.in_any_order();
     const auto sections_of = [&](int slab) { return std::min(height, sections - slab * height); };
     const auto first_of = [&](int slab) { return s.first[2] + slab * height * s.bin; };
     Bytes slab_bytes, next_bytes;
     const auto fetch = [&](int slab,
                            Bytes& into) {  // the raw sections of a slab, or word that they will be wanted
-        if (slab >= slabs) return;
+        if (slab >= range.end_slab) return;
         const int n = sections_of(slab) * s.bin;
-        if (any_order) return s.ask_ahead(first_of(slab), n);
+        if (any_order) {
+            const bool all_rows = range.first_row == 0 && range.end_row == all.end_row;
+            const int row = range.first_row * leaf::dim,
+                      rows = std::min(range.end_row * leaf::dim, s.count[1]) - row;
+            return s.ask_ahead(first_of(slab), n, all_rows ? 0 : s.first[1] + row * s.bin,
+                               all_rows ? static_cast<int>(s.layout.rows) : rows * s.bin);
+        }
         into.resize(static_cast<std::uint64_t>(n) * s.layout.section_bytes);
         s.reader.read_raw_sections(into.data(), n);
     };
-    if (!any_order) s.reader.read_raw_sections(nullptr, s.first[2]);
-    fetch(0, slab_bytes);
-    for (int slab = 0; slab < slabs; ++slab) {
+    if (!any_order) s.reader.read_raw_sections(nullptr, first_of(range.first_slab));
+    fetch(range.first_slab, slab_bytes);
+    for (int slab = range.first_slab; slab < range.end_slab; ++slab) {
         auto coming = std::async(std::launch::async, [&] { fetch(slab + 1, next_bytes); });
         const Bytes* bytes = any_order ? nullptr : &slab_bytes;
-        for (int first = 0; first < strips; first += group) {
-            const std::size_t here = static_cast<std::size_t>(std::min(group, strips - first));
+        for (int first = range.first_row; first < range.end_row; first += group) {
+            const std::size_t here = static_cast<std::size_t>(std::min(group, range.end_row - first));
             begin(here);
             parallel_for(here, 1, [&](std::size_t i) {
                 const int row = first + static_cast<int>(i),
@@ -361,7 +375,8 @@ void StripSource::pass(const Visit& visit, const Begin& begin, const End& end, c
         }
         coming.get();
         std::swap(slab_bytes, next_bytes);
-        progress.report(static_cast<double>(slab + 1) / slabs);
+        progress.report(static_cast<double>(slab + 1 - range.first_slab) /
+                        (range.end_slab - range.first_slab));
     }
 }
 

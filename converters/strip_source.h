@@ -40,6 +40,13 @@ class StripSource {
     /// From the next pass on samples are handed out as (value − shift) · factor.
     void scale(double shift, double factor);
 
+    /// From the next pass on only these strips of eight rows and eight sections are handed out; of a plain
+    /// file nothing else is read. For passes with a height of eight sections.
+    struct Range {
+        int first_row = 0, end_row = 0, first_slab = 0, end_slab = 0;
+    };
+    void restrict_to(const Range& range);
+
     /// Hands out every strip of eight rows and `height` sections once, on any thread: slab after slab in file
     /// order, and within a slab `group` strips at a time (0: all). `begin` is told how many strips come next,
     /// `visit` gets each of them with its place among them, `end` is called when all were visited.

@@ -222,7 +222,7 @@ class LeafReader {
         openvdb::io::setGridBackgroundValuePtr(stream_, &background_);
     }
 
-    const float* operator()(const Coord& corner, float& tile) {
+    const Leaf* operator()(const Coord& corner, float& tile) {
         const Coord origin = corner & ~127;
         if (!run_known_ || origin != origin_) {
             const auto found = notes_.run_at.find(origin);
@@ -235,11 +235,11 @@ class LeafReader {
             tile = tiles_.getValue(corner);
             return nullptr;
         }
-        return decode(*run_, slot);
+        return decode(*run_, slot, corner);
     }
 
  private:
-    const float* decode(const LeafRun& run, openvdb::Index slot) {
+    const Leaf* decode(const LeafRun& run, openvdb::Index slot, const Coord& corner) {
         std::uint64_t rank = 0;  // children before this one
         for (openvdb::Index w = 0; w < slot / 64; ++w)
             rank += static_cast<unsigned>(__builtin_popcountll(run.children.getWord<std::uint64_t>(w)));
@@ -259,7 +259,8 @@ class LeafReader {
         if (!stream_ || stream_.position() != bytes_.size())
             throw InvalidInput(fmt::format("{}: damaged VDB file: the voxels cannot be read (byte {})",
                                            file_.name(), run.buffers_at + begin));
-        return leaf_.buffer().data();
+        leaf_.setOrigin(corner);
+        return &leaf_;
     }
 
     const MappedFile& file_;
@@ -279,6 +280,15 @@ class LeafReader {
 
 LeafLookup VdbSections::State::lookup() const {
     const auto reader = std::make_shared<LeafReader>(file, skeleton, *owner, *notes, *grid);
+    return [reader](const Coord& corner, float& tile) -> const float* {
+        const Leaf* leaf = (*reader)(corner, tile);
+        return leaf ? leaf->buffer().data() : nullptr;
+    };
+}
+
+VdbSections::Leaves VdbSections::leaf_reader() const {
+    const State& s = *state_;
+    const auto reader = std::make_shared<LeafReader>(s.file, s.skeleton, *s.owner, *s.notes, *s.grid);
     return [reader](const Coord& corner, float& tile) { return (*reader)(corner, tile); };
 }
 

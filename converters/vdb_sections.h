@@ -4,6 +4,7 @@
 #include <openvdb/openvdb.h>
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "converters/dense_sections.h"
 #include "converters/mrc.h"
 #include "vdbgeo/core/progress.h"
+#include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo {
 
@@ -37,6 +39,11 @@ class VdbSections {
     /// Sections of this grid, which must live as long. Leaves are read with pread and decoded on all threads,
     /// each once for every slab of eight sections that it lies in, so once.
     DenseSections sections(const Vec3i& first, const Vec3i& size, const std::array<int, 3>& order) const;
+
+    /// Finds leaves for one thread: the leaf whose first voxel is at `corner` (valid until the next call), or
+    /// null where there is none; `tile` is then the value of all its voxels. The grid must live as long.
+    using Leaves = std::function<const leaf::Leaf*(const openvdb::Coord& corner, float& tile)>;
+    Leaves leaf_reader() const;
 
  private:
     struct State;

@@ -1,6 +1,8 @@
 // Help, versions and the examples they show.
 #include <sstream>
 
+#include "converters/map_file.h"
+#include "converters/map_parts.h"
 #include "converters/tet_file.h"
 #include "tests/cli/cli_test.h"
 #include "tests/support/tet_meshes.h"
@@ -12,7 +14,7 @@ namespace {
 const Words all_commands{"info",     "convert",    "phantom",   "denoise",  "edges",          "transform",
                          "flow",     "surface",    "remesh",    "simplify", "smooth",         "repair",
                          "measure",  "components", "curvature", "pockets",  "tetrahedralize", "cutaway",
-                         "validate", "render",     "model",     "report"};
+                         "validate", "render",     "model",     "report",   "merge"};
 
 struct Promise {
     const char* command;
@@ -60,7 +62,8 @@ const std::vector<Promise> promises{
     {"model",
      {"--iso TEXT=auto", "in pixels [1000]", "Voxel size in Å", "-o,--out", "--preset TEXT=molecule", "--set",
       "--from"}},
-    {"report", {"--faces UINT=200000", "--tets UINT=200000", "[10 million]", "--title"}}};
+    {"report", {"--faces UINT=200000", "--tets UINT=200000", "[10 million]", "--title"}},
+    {"merge", {"[blosc]", "--memory", "0, 1, 2, 6, 12 or 101"}}};
 
 /// The words of the lines below "Example:" that call a program.
 std::vector<Words> examples_in(const std::string& help) {
@@ -126,6 +129,9 @@ TEST_F(Help, ExamplesRun) {
     phantom("tomogram.rec", 32, {"--snr", "5"}, "atpase");
     good({"surface", at("emd_1080.map"), at("groel.ply"), "--iso", "0.8"});
     vdbgeo::write_tets(ball_tets(10, 3), at("groel.vtu"));
+    std::filesystem::create_directory(at("smooth.parts"));
+    const vdbgeo::DensityMap whole = vdbgeo::read_map(at("emd_1080.map")).map;
+    vdbgeo::write_map_part(whole, {openvdb::Coord(0), openvdb::Coord(31)}, 0, at("smooth.parts"));
     RunOptions here;
     here.folder = folder_.path();
     for (const std::string& command : all_commands) {

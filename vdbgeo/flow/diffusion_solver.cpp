@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/line_solve.h"
 
@@ -74,10 +75,17 @@ std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double large
     return growing;
 }
 
+int diffusion_halo(const std::vector<DiffusionTerm>& terms, const EdgeScale& sigma) {
+    int halo = sigma.kind == EdgeScale::Kind::local ? sigma.radius + 1 : 1;
+    for (const DiffusionTerm& t : terms) halo = std::max(halo, stencil::sweep_halo(t.order));
+    return (halo + 7) / 8 * 8;
+}
+
 DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields,
-                                 const EdgeScale& sigma)
+                                 const EdgeScale& sigma, const stencil::Share* share)
     : grid_(grid),
-      layout_(grid.tree()),
+      share_(share),
+      layout_(grid.tree(), share ? std::optional(share->own()) : std::nullopt),
       fields_(std::move(fields)),
       sigma_(sigma),
       weights_(axis_weights(grid.transform())) {
@@ -95,8 +103,10 @@ DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Fie
                                                             : BlockField());
         states_.push_back(std::move(s));
     }
+    if (share) ghosts_ = std::make_unique<stencil::GhostExchange>(layout_, *share);
     stencil::load(layout_, grid.tree(), 0, states_[0].now.now());
-    const stencil::FieldSummary given = summarize(layout_, states_[0].now.now());
+    const stencil::FieldSummary given = summarize(layout_, states_[0].now.now(), team());
+    active_ = given.count + given.non_finite;
     if (given.non_finite)
         throw InvalidInput(
             fmt::format("{} of {} values are NaN or infinite; --threshold or --mask leaves them out",
@@ -108,7 +118,7 @@ DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Fie
         input_ = BlockField(layout_.brick_count());
         stencil::load(layout_, grid.tree(), offset_, input_.brick(0));
     }
-    summary_.assign(fields_.size(), summarize(layout_, states_[0].now.now()));
+    summary_.assign(fields_.size(), summarize(layout_, states_[0].now.now(), team()));
     mean_before_ = mean();
 }
 
@@ -127,9 +137,46 @@ double DiffusionSolver::bound() const {
 double DiffusionSolver::step(Stepper stepper, const std::optional<double>& dt) const {
     constexpr double safety = 0.9, implicit = 20;
     const double largest = stepper == Stepper::adi ? implicit * bound() : bound();
+    if (team() && stepper == Stepper::adi)
+        throw InvalidInput("the stepper adi solves along whole lines of the map: parts of it will not do");
     if (dt && *dt > largest)
         throw InvalidInput(fmt::format("dt = {:g} is above the stability bound {:.6g}", *dt, largest));
     return dt.value_or(safety * largest);
+}
+
+/// The fields' bricks as they are now; `before`: and as they were a step ago, behind.
+std::vector<float*> DiffusionSolver::states(bool before) {
+    std::vector<float*> all;
+    for (State& s : states_) all.push_back(s.now.now());
+    if (before)
+        for (State& s : states_) all.push_back(s.before.now());
+    return all;
+}
+
+/// Coefficients of all fields, those of ghosts too: they come from their owners.
+void DiffusionSolver::freeze() {
+    if (constant_coefficients()) return;
+    for (std::size_t i = 0; i < fields_.size(); ++i) freeze(i);
+    if (!ghosts_) return;
+    std::vector<float*> found;
+    for (State& s : states_)
+        for (BlockField& d : s.diffusivities)
+            if (!d.empty()) found.push_back(d.brick(0));
+    ghosts_->run(found);
+}
+
+/// A sweep, and what other members need of it on its way while it goes on.
+void DiffusionSolver::take_sweep(stencil::SweepPlan& plan, const Progress& progress) {
+    if (!ghosts_) return sweep(layout_, plan, progress);
+    const std::vector<float*> read = states(!plan.begins);
+    std::vector<const float*> written;
+    for (State& s : states_) written.push_back(s.now.next());
+    if (!plan.ends)
+        for (State& s : states_) written.push_back(s.before.next());
+    ghosts_->begin(written.size());
+    plan.before_slab = [&](std::size_t slab) { ghosts_->fill_around(slab, read); };
+    plan.after_slab = [&](std::size_t slab) { ghosts_->send(slab, written); };
+    sweep(layout_, plan, progress);
 }
 
 void DiffusionSolver::freeze(std::size_t field) {
@@ -146,7 +193,7 @@ void DiffusionSolver::freeze(std::size_t field) {
         d.radius = sigma_.kind == EdgeScale::Kind::local ? sigma_.radius : 0;
         if (sigma_.kind == EdgeScale::Kind::value) d.sigma_squared = sigma_.value * sigma_.value;
         if (sigma_.kind == EdgeScale::Kind::global)
-            d.sigma_squared = d.scale * (d.of_gradient ? gradient_variance(layout_, u, weights_)
+            d.sigma_squared = d.scale * (d.of_gradient ? gradient_variance(layout_, u, weights_, team())
                                                        : summary_[field].variance());
         diffusivity(layout_, u, weights_, d, s.diffusivities[i].brick(0));
     }
@@ -173,8 +220,7 @@ stencil::SweepPlan DiffusionSolver::plan() {
 }
 
 void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& progress) {
-    if (!constant_coefficients())
-        for (std::size_t i = 0; i < fields_.size(); ++i) freeze(i);
+    freeze();
     if (stepper == Stepper::adi) {
         for (int k = 0; k < n; ++k) {
             implicit_step(tau);
@@ -192,9 +238,10 @@ void DiffusionSolver::cycle(Stepper stepper, int n, double tau, const Progress& 
         for (; k < end; ++k) p.steps.push_back({stepper == Stepper::fsi ? fsi_relaxation(k) : 1.0, tau});
         p.begins = s == 0 || stepper != Stepper::fsi;
         p.ends = s + 1 == sweeps || stepper != Stepper::fsi;
-        sweep(layout_, p, progress.part(double(s) / sweeps, double(s + 1) / sweeps));
+        take_sweep(p, progress.part(double(s) / sweeps, double(s + 1) / sweeps));
     }
     check();
+    if (ghosts_) ghosts_->fill_all(states(false));
 }
 
 /// u += Π_a (I + θ τ A_a)^{-1} τ A u, where A is the whole operator and A_a = Σ_q L_{d,a} L_a^q: first order
@@ -254,12 +301,13 @@ void DiffusionSolver::describe(HyperdiffusionReport& report) const {
     report.mean_before = mean_before_;
     report.mean_after = mean();
     report.state_bytes = state_bytes();
+    report.bytes_sent = bytes_sent();
     report.removed = removed();
 }
 
 void DiffusionSolver::check() {
     for (std::size_t i = 0; i < fields_.size(); ++i) {
-        summary_[i] = summarize(layout_, states_[i].now.now());
+        summary_[i] = summarize(layout_, states_[i].now.now(), team());
         if (summary_[i].non_finite)
             throw NumericalError("the values diverged: a smaller --dt or --diffusivity is needed");
     }
@@ -270,31 +318,24 @@ void DiffusionSolver::check() {
 
 void DiffusionSolver::reset() {
     for (State& s : states_) stencil::load(layout_, grid_.tree(), offset_, s.now.now());
-    for (stencil::FieldSummary& s : summary_) s = summarize(layout_, states_[0].now.now());
+    for (stencil::FieldSummary& s : summary_) s = summarize(layout_, states_[0].now.now(), team());
 }
 
 double DiffusionSolver::removed() const {
-    const std::size_t n = layout_.brick_count();
     const float* now = states_[0].now.now();
-    const double sum = fixed_order_reduce(
-        n, 64, 0.0,
-        [&](std::size_t begin, std::size_t end) {
-            openvdb::FloatGrid::ConstAccessor at = grid_.getConstAccessor();
-            double part = 0;
-            for (std::size_t b = begin; b < end; ++b) {
-                const float* x = at.probeConstLeaf(layout_.origin(b))->buffer().data();
-                const float* u = now + b * BlockField::brick_size;
-                for (std::size_t w = 0; w < 8; ++w)
-                    for (std::uint64_t word = layout_.mask(b)[w]; word; word &= word - 1) {
-                        const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
-                        const double d = static_cast<double>(x[i] - offset_) - u[i];
-                        part += d * d;
-                    }
+    const auto part = [&](std::size_t b, double& sum) {
+        const float* x = grid_.tree().probeConstLeaf(layout_.origin(b))->buffer().data();
+        const float* u = now + b * BlockField::brick_size;
+        for (std::size_t w = 0; w < 8; ++w)
+            for (std::uint64_t word = layout_.mask(b)[w]; word; word &= word - 1) {
+                const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
+                const double d = static_cast<double>(x[i] - offset_) - u[i];
+                sum += d * d;
             }
-            return part;
-        },
-        [](double& total, double part) { total += part; });
-    return std::sqrt(sum / std::max(1.0, static_cast<double>(layout_.active_count())));
+    };
+    const double sum =
+        sum_bricks(layout_, team(), 0.0, part, [](double& total, double value) { total += value; });
+    return std::sqrt(sum / std::max(1.0, static_cast<double>(active_)));
 }
 
 void DiffusionSolver::store(openvdb::FloatGrid& grid) const {

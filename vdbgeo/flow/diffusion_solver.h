@@ -2,11 +2,13 @@
 // in cycles of frozen coefficients.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "vdbgeo/flow/hyperdiffusion.h"
 #include "vdbgeo/stencil/diffusion_sweep.h"
+#include "vdbgeo/stencil/ghost_exchange.h"
 
 namespace vdbgeo {
 
@@ -33,6 +35,9 @@ int growing_cycle(int order, int k);
 /// The cycles that take a time with FSI, with steps of at most `largest`; for other steppers cycles of one
 /// step.
 std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double largest, const CycleRule& rule);
+/// How far around its own cells, in voxels and whole leaves, a member of a team has to have a grid.
+int diffusion_halo(const std::vector<DiffusionTerm>& terms, const EdgeScale& sigma);
+
 /// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with
 /// two, each is drawn to the other.
 class DiffusionSolver {
@@ -42,8 +47,11 @@ class DiffusionSolver {
         double coupling = 0;  ///< β
     };
     /// Takes X from the grid, which has leaves only (voxelized). The grid is read now and by `removed`, and
-    /// has to live as long. InvalidInput for values that are not finite.
-    DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma);
+    /// has to live as long. InvalidInput for values that are not finite. `share`: the grid is one member's
+    /// part of a larger one, ghosts included; it has to live as long. Its halo is at least diffusion_halo.
+    /// What is told of the grid, here and in reports, is of all parts.
+    DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields, const EdgeScale& sigma,
+                    const stencil::Share* share = nullptr);
 
     /// Explicit steps are stable up to this.
     double bound() const;
@@ -59,7 +67,7 @@ class DiffusionSolver {
     /// Voxels, means, what was removed, memory.
     void describe(HyperdiffusionReport& report) const;
 
-    std::uint64_t active_voxels() const { return layout_.active_count(); }
+    std::uint64_t active_voxels() const { return active_; }
     double mean_before() const { return mean_before_; }
     double mean(std::size_t field = 0) const { return summary_[field].mean() + offset_; }
     bool constant_coefficients() const { return sigma_.kind == EdgeScale::Kind::infinite; }
@@ -69,6 +77,8 @@ class DiffusionSolver {
     double removed() const;
     /// Writes the first field into the grid's active voxels; with two fields their difference.
     void store(openvdb::FloatGrid& grid) const;
+    /// Bytes sent to other members.
+    std::uint64_t bytes_sent() const { return ghosts_ ? ghosts_->bytes_sent() : 0; }
     /// Memory of fields and tables.
     std::size_t state_bytes() const;
 
@@ -79,12 +89,18 @@ class DiffusionSolver {
     };
     void run(Stepper stepper, const CycleRun& cycles, HyperdiffusionReport& report, const Progress& progress);
     void implicit_step(double tau);
+    void freeze();
     void freeze(std::size_t field);
     stencil::SweepPlan plan();
+    void take_sweep(stencil::SweepPlan& plan, const Progress& progress);
+    std::vector<float*> states(bool before);
+    Team* team() const { return share_ ? share_->team : nullptr; }
     void check();
 
     const openvdb::FloatGrid& grid_;
+    const stencil::Share* share_;
     stencil::BlockLayout layout_;
+    std::unique_ptr<stencil::GhostExchange> ghosts_;  // of a share
     std::vector<Field> fields_;
     std::vector<State> states_;
     stencil::BlockField input_;  // X, where it is a target
@@ -94,6 +110,7 @@ class DiffusionSolver {
     float offset_ =
         0;  // taken off X, so that rounding errors go with the spread of the values, not their size
     double mean_before_ = 0, range_ = 0;
+    std::uint64_t active_ = 0;
 };
 
 }  // namespace vdbgeo

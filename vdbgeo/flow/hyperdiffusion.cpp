@@ -201,15 +201,23 @@ Vec3d axis_weights(const openvdb::math::Transform& transform) {
     return w;
 }
 
+int hyperdiffusion_halo(const HyperdiffusionOptions& options) {
+    return diffusion_halo(options.terms, options.sigma);
+}
+
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options,
-                                  const Progress& progress) {
+                                  const Progress& progress, const stencil::Share* share) {
     options.check();
+    if (share && share->halo < hyperdiffusion_halo(options))
+        throw InvalidInput(fmt::format("a halo of {} voxels is needed, and there is one of {}",
+                                       hyperdiffusion_halo(options), share->halo));
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
-    if (grid.activeVoxelCount() == 0) return report;
+    if (!share && grid.activeVoxelCount() == 0) return report;
     report.automatic = !options.time && !options.steps;
-    if (report.automatic) report.noise = removable_noise(grid);
-    DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma);
+    if (report.automatic) report.noise = removable_noise(grid, share);
+    DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma, share);
+    if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
     if (!report.automatic)
         solver.run(options.stepper, plan_of(options, step), report, progress);

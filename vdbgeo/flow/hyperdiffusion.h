@@ -10,6 +10,7 @@
 
 #include "vdbgeo/core/progress.h"
 #include "vdbgeo/core/types.h"
+#include "vdbgeo/stencil/share.h"
 
 namespace vdbgeo {
 
@@ -41,7 +42,8 @@ enum class Stepper {
 };
 
 struct HyperdiffusionOptions {
-    std::vector<DiffusionTerm> terms{{1, 1.0}};  ///< orders differ
+    std::vector<DiffusionTerm> terms =
+        std::vector<DiffusionTerm>(1, DiffusionTerm{1, 1.0});  ///< orders differ
     EdgeScale sigma{EdgeScale::Kind::global, 2, 0, 1};
     /// Diffusion time, ≥ 0; 0 gives the input back. Unset, with `steps` unset too: until the root mean square
     /// of X − u reaches the noise (removable_noise), the discrepancy principle, or for 320 steps, 150 of more
@@ -66,10 +68,11 @@ struct HyperdiffusionReport {
     double dt = 0, time = 0;
     int steps = 0, cycles = 0;
     double mean_before = 0, mean_after = 0;
-    double noise = 0;             ///< estimated standard deviation of the noise, where it was asked for
-    double removed = 0;           ///< root mean square of X − u
-    bool automatic = false;       ///< the time was chosen here
-    std::size_t state_bytes = 0;  ///< memory of fields and tables beside the grid
+    double noise = 0;              ///< estimated standard deviation of the noise, where it was asked for
+    double removed = 0;            ///< root mean square of X − u
+    bool automatic = false;        ///< the time was chosen here
+    std::size_t state_bytes = 0;   ///< memory of fields and tables beside the grid
+    std::uint64_t bytes_sent = 0;  ///< to other members of the team
 };
 
 /// w_a = (h_min / h_a)² of the axes of a grid's transform: 1 for cubic voxels.
@@ -83,7 +86,14 @@ Vec3d axis_weights(const openvdb::math::Transform& transform);
 /// Throws InvalidInput for bad options, values that are not finite, a dt above the bound; NumericalError
 /// where the values or their mean diverge; Cancelled. The grid is only written to at the end. Memory: 12 to
 /// 16 bytes a voxel of active leaves for one order. Cost: docs/performance.md.
+///
+/// `share`: the grid is one member's part of a larger one, with the halo that hyperdiffusion_halo tells; all
+/// members call this with the same options. The own voxels then get the bits that they would get in one grid
+/// of all parts; ghosts are left as they were. Not with Stepper::adi.
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options = {},
-                                  const Progress& progress = {});
+                                  const Progress& progress = {}, const stencil::Share* share = nullptr);
+
+/// Voxels that a part needs around its own.
+int hyperdiffusion_halo(const HyperdiffusionOptions& options);
 
 }  // namespace vdbgeo

@@ -37,17 +37,20 @@ std::size_t band_of(const Tile& t, int spacing, float* out) {
     return n;
 }
 
-double noise_of(const openvdb::FloatTree& tree, int spacing) {
+double noise_of(const openvdb::FloatTree& tree, int spacing, const stencil::Share* share) {
     constexpr double to_deviation = 1.4826;  // of a median absolute value, for a normal distribution
     constexpr double stencil_norm = 42;      // 6² + 6 · 1²
     constexpr std::size_t cell =
         std::size_t(1) * BlockLayout::size_x * BlockLayout::size_y * BlockLayout::size_z;
     constexpr std::size_t sample = 8000000;
-    const BlockLayout layout(tree);
+    Team* const team = share ? share->team : nullptr;
+    const BlockLayout layout(tree, share ? std::optional(share->own()) : std::nullopt);
+    std::vector<std::uint64_t> active{layout.active_count()};
+    if (team) team->add_up(active);
     BlockField field(layout.brick_count());
     stencil::load(layout, tree, 0, field.brick(0));
     stencil::TileFields fields{{field.brick(0)}, {}, spacing, 0};
-    fields.every = std::max<std::size_t>(1, layout.active_count() / sample);
+    fields.every = std::max<std::size_t>(1, active[0] / sample);
     OrderStatistic median(0.5);
     while (!median.done()) {
         stencil::for_each_tile(layout, fields, [&](Tile& t) {
@@ -55,25 +58,25 @@ double noise_of(const openvdb::FloatTree& tree, int spacing) {
             std::vector<float> band(cell + 1);
             median.add(band.data(), band_of(t, spacing, band.data()));
         });
-        median.end_pass();
+        median.end_pass(team);
     }
     return median.count() ? to_deviation * median.value() / std::sqrt(stencil_norm) : 0;
 }
 
 }  // namespace
 
-double estimate_noise(const openvdb::FloatGrid& grid, int spacing) {
+double estimate_noise(const openvdb::FloatGrid& grid, int spacing, const stencil::Share* share) {
     if (spacing < 1 || spacing > 8) throw InvalidInput("the spacing of the noise estimate is 1 to 8");
-    if (!grid.tree().hasActiveTiles()) return noise_of(grid.tree(), spacing);
+    if (!grid.tree().hasActiveTiles()) return noise_of(grid.tree(), spacing, share);
     openvdb::FloatTree leaves(grid.tree());
     leaves.voxelizeActiveTiles();
-    return noise_of(leaves, spacing);
+    return noise_of(leaves, spacing, share);
 }
 
-double removable_noise(const openvdb::FloatGrid& grid) {
+double removable_noise(const openvdb::FloatGrid& grid, const stencil::Share* share) {
     constexpr double flat = 1.3;
-    const double near = estimate_noise(grid, 2);
-    return near > 0 && estimate_noise(grid, 4) <= flat * near ? near : estimate_noise(grid, 1);
+    const double near = estimate_noise(grid, 2, share);
+    return near > 0 && estimate_noise(grid, 4, share) <= flat * near ? near : estimate_noise(grid, 1, share);
 }
 
 }  // namespace vdbgeo

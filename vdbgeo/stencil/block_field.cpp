@@ -10,13 +10,14 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo::stencil {
 namespace {
 
 constexpr std::size_t huge_page = std::size_t(2) << 20, cache_line = 64;
-constexpr std::size_t reduce_block = 64;  // bricks
+constexpr std::size_t task = 64;  // bricks
 
 }  // namespace
 
@@ -40,59 +41,51 @@ double FieldSummary::variance() const {
     return std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m);
 }
 
-FieldSummary summarize(const BlockLayout& layout, const float* bricks) {
+FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team) {
     FieldSummary start;
     start.min = std::numeric_limits<float>::infinity();
     start.max = -start.min;
-    const auto part = [&](std::size_t begin, std::size_t end) {
-        FieldSummary s = start;
-        for (std::size_t i = begin; i < end; ++i) {
-            const float* v = bricks + i * BlockField::brick_size;
-            for (std::size_t x = 0; x < 8; ++x)
-                for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
-                    const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
-                    if (!std::isfinite(value)) {
-                        ++s.non_finite;
-                        continue;
-                    }
-                    ++s.count;
-                    s.sum += value;
-                    s.sum_of_squares += static_cast<double>(value) * value;
-                    s.min = std::min(s.min, value);
-                    s.max = std::max(s.max, value);
+    const auto part = [&](std::size_t i, FieldSummary& s) {
+        const float* v = bricks + i * BlockField::brick_size;
+        for (std::size_t x = 0; x < 8; ++x)
+            for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
+                const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
+                if (!std::isfinite(value)) {
+                    ++s.non_finite;
+                    continue;
                 }
-        }
-        return s;
+                ++s.count;
+                s.sum += value;
+                s.sum_of_squares += static_cast<double>(value) * value;
+                s.min = std::min(s.min, value);
+                s.max = std::max(s.max, value);
+            }
     };
-    FieldSummary total = fixed_order_reduce(layout.brick_count(), reduce_block, start, part,
-                                            [](FieldSummary& a, const FieldSummary& b) {
-                                                a.sum += b.sum;
-                                                a.sum_of_squares += b.sum_of_squares;
-                                                a.min = std::min(a.min, b.min);
-                                                a.max = std::max(a.max, b.max);
-                                                a.count += b.count;
-                                                a.non_finite += b.non_finite;
-                                            });
+    FieldSummary total = sum_bricks(layout, team, start, part, [](FieldSummary& a, const FieldSummary& b) {
+        a.sum += b.sum;
+        a.sum_of_squares += b.sum_of_squares;
+        a.min = std::min(a.min, b.min);
+        a.max = std::max(a.max, b.max);
+        a.count += b.count;
+        a.non_finite += b.non_finite;
+    });
     if (total.count == 0) total.min = total.max = 0;
     return total;
 }
 
-double squared_distance(const BlockLayout& layout, const float* a, const float* b) {
-    const auto part = [&](std::size_t begin, std::size_t end) {
-        double sum = 0;
+double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team) {
+    const auto part = [&](std::size_t brick, double& sum) {
         // Inactive voxels are 0 in every field.
-        for (std::size_t i = begin * BlockField::brick_size; i < end * BlockField::brick_size; ++i) {
+        for (std::size_t i = brick * BlockField::brick_size; i < (brick + 1) * BlockField::brick_size; ++i) {
             const double d = static_cast<double>(a[i]) - b[i];
             sum += d * d;
         }
-        return sum;
     };
-    return fixed_order_reduce(layout.brick_count(), reduce_block, 0.0, part,
-                              [](double& total, double value) { total += value; });
+    return sum_bricks(layout, team, 0.0, part, [](double& total, double value) { total += value; });
 }
 
 void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out) {
-    parallel_blocks(layout.brick_count(), reduce_block, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(layout.brick_count(), task, [&](std::size_t begin, std::size_t end) {
         openvdb::FloatTree::LeafNodeType const* node = nullptr;
         openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree);
         for (std::size_t i = begin; i < end; ++i) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 
+#include "vdbgeo/core/team.h"
 #include "vdbgeo/stencil/block_layout.h"
 
 namespace vdbgeo::stencil {
@@ -43,11 +44,12 @@ struct FieldSummary {
     double variance() const;
 };
 
-/// A field as it is in memory: brick i of the layout at `bricks` + 512 i.
-FieldSummary summarize(const BlockLayout& layout, const float* bricks);
+/// A field as it is in memory: brick i of the layout at `bricks` + 512 i. Over the own cells, of all members
+/// where there is a team; the same bits however the cells are shared out.
+FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team = nullptr);
 
-/// Σ (a − b)² over the active voxels.
-double squared_distance(const BlockLayout& layout, const float* a, const float* b);
+/// Σ (a − b)² over the active voxels, likewise.
+double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team = nullptr);
 
 /// out = value − offset in the active voxels, 0 in the others. The tree has the layout's leaves.
 void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out);

@@ -37,7 +37,7 @@ std::size_t slot_in_cell(const Coord& o) {
 
 }  // namespace
 
-BlockLayout::BlockLayout(const openvdb::FloatTree& tree) {
+BlockLayout::BlockLayout(const openvdb::FloatTree& tree, const std::optional<openvdb::CoordBBox>& own) {
     if (tree.hasActiveTiles()) throw InvalidInput("the grid has active tiles where leaves are needed");
     std::vector<const Leaf*> leaves;
     tree.getNodes(leaves);
@@ -58,20 +58,30 @@ BlockLayout::BlockLayout(const openvdb::FloatTree& tree) {
             masks_[i][w] = leaves[i]->getValueMask().getWord<std::uint64_t>(w);
         full_[i] = leaves[i]->isDense();
     });
-    for (const Mask& m : masks_)
-        for (const std::uint64_t word : m) active_ += static_cast<std::uint64_t>(__builtin_popcountll(word));
-    make_cells();
+    make_cells(own);
     make_neighbors();
+    count_active();
 }
 
-void BlockLayout::make_cells() {
+void BlockLayout::count_active() {
+    for (const Cell& cell : cells_) {
+        if (!cell.own) continue;
+        for (const std::int32_t b : cell.bricks) {
+            if (b == none) continue;
+            for (const std::uint64_t word : masks_[static_cast<std::size_t>(b)])
+                active_ += static_cast<std::uint64_t>(__builtin_popcountll(word));
+        }
+    }
+}
+
+void BlockLayout::make_cells(const std::optional<openvdb::CoordBBox>& own) {
     for (std::size_t i = 0; i < origins_.size(); ++i) {
         const Coord c = cell_of(origins_[i]);
         const Coord first(c.x() * size_x, c.y() * size_y, c.z() * size_z);
         if (cells_.empty() || cells_.back().origin != first) {
             if (cells_.empty() || cells_.back().origin.y() != first.y())
                 slabs_.push_back({i, i, cells_.size(), cells_.size()});
-            cells_.push_back({first, {}, {}});
+            cells_.push_back({first, {}, {}, !own || own->isInside(first)});
             cells_.back().bricks.fill(none);
             ++slabs_.back().last_cell;
         }
@@ -100,6 +110,7 @@ void BlockLayout::make_neighbors() {
 std::vector<BlockLayout::Run> BlockLayout::runs(const Slab& slab, int length) const {
     std::vector<Run> out;
     for (std::size_t i = slab.first_cell; i < slab.last_cell; ++i) {
+        if (!cells_[i].own) continue;
         const Coord& o = cells_[i].origin;
         const bool goes_on = !out.empty() && i > slab.first_cell &&
                              cells_[i - 1].origin == o.offsetBy(-size_x, 0, 0) &&

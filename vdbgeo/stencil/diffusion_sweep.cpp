@@ -211,6 +211,8 @@ ShiftedField::ShiftedField(const BlockLayout& layout) {
     field_ = BlockField(layout.brick_count() + shift_);
 }
 
+int sweep_halo(int max_order) { return steps_per_sweep(max_order) * (max_order + 1); }
+
 int steps_per_sweep(int max_order) {
     switch (max_order) {
         case 0:
@@ -232,9 +234,11 @@ void sweep(const BlockLayout& layout, SweepPlan& plan, const Progress& progress)
     const auto& slabs = layout.slabs();
     const bool forward = plan.fields.front().state->forward();
     for (std::size_t i = 0; i < slabs.size(); ++i) {
-        const BlockLayout::Slab& slab = slabs[forward ? i : slabs.size() - 1 - i];
-        const std::vector<BlockLayout::Run> runs = layout.runs(slab, run_length);
+        const std::size_t at = forward ? i : slabs.size() - 1 - i;
+        const std::vector<BlockLayout::Run> runs = layout.runs(slabs[at], run_length);
+        if (plan.before_slab) plan.before_slab(at);
         parallel_for(runs.size(), 1, [&](std::size_t r) { work.run(runs[r], scratch.local()); });
+        if (plan.after_slab) plan.after_slab(at);
         progress.report(static_cast<double>(i + 1) / static_cast<double>(slabs.size()));
     }
     for (SweepField& f : plan.fields) {

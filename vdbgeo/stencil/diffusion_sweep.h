@@ -2,6 +2,7 @@
 // memory.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "vdbgeo/core/progress.h"
@@ -60,10 +61,15 @@ struct SweepPlan {
     std::vector<Step> steps;
     bool begins = true;  ///< u_{k−1} = u_k: `before` is not read
     bool ends = true;    ///< `before` is not wanted and not written
+    /// Called for each slab of the layout before anything of it is read, and once it is written: all slabs
+    /// from the first to the last where `state` goes forward, else from the last to the first.
+    std::function<void(std::size_t slab)> before_slab, after_slab;
 };
 
 /// The number of steps that fit into one pass for operators up to this order.
 int steps_per_sweep(int max_order);
+/// How far, in voxels, those steps look.
+int sweep_halo(int max_order);
 
 /// Takes the steps, all in one pass: each tile is read with a halo of steps · (order + 1) voxels, taken
 /// through all of them in cache, plane behind plane, and written once. Face between an active voxel and

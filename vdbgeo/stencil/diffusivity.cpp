@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/stencil/plane_kernels.h"
 #include "vdbgeo/stencil/tiles.h"
 
@@ -149,7 +149,7 @@ void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights
     for_each_tile(layout, fields, [&](Tile& t) { TileDiffusivity(t, options, scale).run(); });
 }
 
-double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights) {
+double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights, Team* team) {
     struct Sums {
         double square = 0, component[3] = {};
     };
@@ -178,12 +178,13 @@ double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d&
                 }
         }
     });
-    Sums total;
-    for (const Sums& s : of_cell) {
-        total.square += s.square;
-        for (int c = 0; c < 3; ++c) total.component[c] += s.component[c];
-    }
-    const double n = std::max(1.0, static_cast<double>(layout.active_count()));
+    const Sums total = join_cells(layout, team, of_cell, Sums(), [](Sums& a, const Sums& b) {
+        a.square += b.square;
+        for (int c = 0; c < 3; ++c) a.component[c] += b.component[c];
+    });
+    std::vector<std::uint64_t> count{layout.active_count()};
+    if (team) team->add_up(count);
+    const double n = std::max(1.0, static_cast<double>(count[0]));
     double means = 0;
     for (const double c : total.component) means += c / n * (c / n);
     return std::max(0.0, total.square / n - means);

@@ -23,7 +23,9 @@ struct Diffusivity {
 void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights, const Diffusivity& options,
                  float* out);
 
-/// Variance of ∇u over the active voxels of the grid, summed over its components times √w_a.
-double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights);
+/// Variance of ∇u over the active voxels of the grid, summed over its components times √w_a; of all members
+/// where there is a team.
+double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights,
+                         Team* team = nullptr);
 
 }  // namespace vdbgeo::stencil

@@ -89,6 +89,19 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
     kernels().finish_writing();
 }
 
+/// Whether a cell is one of those that stand for `every` of them: neighbours along each axis fall to
+/// different ones.
+bool in_sample(const openvdb::Coord& origin, std::size_t every) {
+    if (every == 1) return true;
+    const auto at = [](int voxel, int size) {
+        return static_cast<std::uint64_t>(std::int64_t{voxel} / size);
+    };
+    const std::uint64_t place = at(origin.x(), BlockLayout::size_x) * 73856093u ^
+                                at(origin.y(), BlockLayout::size_y) * 19349663u ^
+                                at(origin.z(), BlockLayout::size_z) * 83492791u;
+    return place % every == 0;
+}
+
 }  // namespace
 
 void for_each_tile(const BlockLayout& layout, const TileFields& fields,
@@ -97,11 +110,14 @@ void for_each_tile(const BlockLayout& layout, const TileFields& fields,
         throw InvalidInput("the halo of a tile is too wide");
     const Shape shape(fields.halo);
     tbb::enumerable_thread_specific<Arrays> arrays([&] { return Arrays(shape, fields); });
+    std::vector<std::int32_t> cells;
+    for (std::size_t i = 0; i < layout.cells().size(); ++i)
+        if (layout.cells()[i].own && in_sample(layout.cells()[i].origin, fields.every))
+            cells.push_back(static_cast<std::int32_t>(i));
     std::atomic<std::size_t> done{0};
-    const std::size_t cells = (layout.cells().size() + fields.every - 1) / fields.every;
-    parallel_for(cells, 1, [&](std::size_t i) {
-        run_tile(layout, static_cast<std::int32_t>(i * fields.every), shape, fields, body, arrays.local());
-        progress.report(static_cast<double>(++done) / static_cast<double>(cells));
+    parallel_for(cells.size(), 1, [&](std::size_t i) {
+        run_tile(layout, cells[i], shape, fields, body, arrays.local());
+        progress.report(static_cast<double>(++done) / static_cast<double>(cells.size()));
     });
 }
 

@@ -37,11 +37,12 @@ struct TileFields {
     std::vector<float*> out;       ///< bricks; another memory than `in`
     int halo = 1;                  ///< 0…16
     int scratch = 0;               ///< how many arrays to work in
-    std::size_t every = 1;         ///< only each such cell: a sample, where nothing is written
+    /// Only about one cell of so many, chosen by where they lie: a sample, where nothing is written.
+    std::size_t every = 1;
 };
 
-/// Runs body(tile) for every cell, in parallel; each thread has its own arrays. (32+2h)² (128+2h') floats an
-/// array. Only active voxels of the cell may be written with something else than 0 in `out`.
+/// Runs body(tile) for every own cell, in parallel; each thread has its own arrays. (32+2h)² (128+2h') floats
+/// an array. Only active voxels of the cell may be written with something else than 0 in `out`.
 void for_each_tile(const BlockLayout& layout, const TileFields& fields,
                    const std::function<void(Tile&)>& body, const Progress& progress = {});
 

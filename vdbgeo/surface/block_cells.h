@@ -8,15 +8,17 @@
 
 namespace vdbgeo {
 
-/// The crossed edges that begin in one block, its cells, and where their vertices and triangles stand in the
-/// mesh. Filled by the thread that counts the block.
+/// The crossed edges that begin in one block, its cells, and where their vertices and triangles stand. Filled
+/// by the thread that counts the block.
 struct BlockCells {
     cell::EdgeBits edges;
     cell::BlockBits active;  ///< cells that the surface crosses
     std::uint16_t edge_vertices, extra_vertices;
     std::uint16_t cells;
     std::uint32_t triangles;
-    std::uint64_t first_vertex, first_triangle;
+    std::uint32_t first_vertex;    ///< its number in the mesh
+    std::uint32_t vertex_place;    ///< and its place among the vertices of this extraction
+    std::uint64_t triangle_place;  ///< of the first triangle among those of this extraction
 };
 
 /// Fills `edges`, `active` and `edge_vertices`. `samples`: how many of the block's samples and of the next

@@ -35,8 +35,8 @@ std::uint64_t step_z(std::uint64_t word, std::uint64_t next) {
 }  // namespace
 
 CrossingBlocks::CrossingBlocks(const openvdb::FloatTree& tree, const Frame& frame, float isovalue,
-                               const Progress& progress)
-    : tree_(tree), frame_(frame), isovalue_(isovalue) {
+                               const Progress& progress, const openvdb::CoordBBox& within)
+    : tree_(tree), frame_(frame), isovalue_(isovalue), within_(within) {
     collect_nodes();
     parallel_for(nodes_.size(), 1, [&](std::size_t n) { classify(nodes_[n]); });
     progress.report(0.5);
@@ -65,9 +65,19 @@ bool CrossingBlocks::outside_box(const Coord& origin, int dim) const {
     return false;
 }
 
+/// Whether a node of `dim` voxels has neither blocks that are looked for nor the first layers of their upper
+/// neighbours.
+bool CrossingBlocks::out_of_reach(const Coord& origin, int dim) const {
+    for (int a = 0; a < 3; ++a) {
+        const std::int64_t first = origin[a], last = first + dim - 1;
+        if (last < within_.min()[a] || first > std::int64_t{within_.max()[a]} + 1) return true;
+    }
+    return false;
+}
+
 /// A node and its lower neighbours: their last cells reach into it.
 void CrossingBlocks::add_nodes(const Coord& origin) {
-    if (outside_box(origin, node_voxels)) return;
+    if (outside_box(origin, node_voxels) || out_of_reach(origin, node_voxels)) return;
     // The neighbours' indices are 32-bit numbers too.
     constexpr std::int64_t end = std::int64_t{1} << 31, room = 2 * node_voxels;
     for (int a = 0; a < 3; ++a)
@@ -76,7 +86,7 @@ void CrossingBlocks::add_nodes(const Coord& origin) {
                 fmt::format("a block of the grid begins at index {}, too near to 2^31", origin[a]));
     for (int side = 0; side < 8; ++side) {
         const Coord c = offset(origin, side, -node_voxels);
-        if (outside_box(c, node_voxels)) continue;
+        if (outside_box(c, node_voxels) || out_of_reach(c, node_voxels)) continue;
         node_at_.emplace(c, 0);
     }
 }
@@ -92,7 +102,8 @@ void CrossingBlocks::collect_nodes() {
         for (auto it = node->cbeginValueAll(); it; ++it)
             if (sign_state(*it) != outside) add_nodes(it.getCoord());
     for (auto it = tree_.root().cbeginValueAll(); it; ++it)
-        if (sign_state(*it) != outside && !outside_box(it.getCoord(), leaf::UpperNode::DIM))
+        if (sign_state(*it) != outside && !outside_box(it.getCoord(), leaf::UpperNode::DIM) &&
+            !out_of_reach(it.getCoord(), leaf::UpperNode::DIM))
             throw InvalidInput(
                 "a constant block of 4096³ voxels lies across the isovalue from the background");
 
@@ -171,7 +182,7 @@ void CrossingBlocks::find_blocks(std::size_t n, std::vector<Block>& out) const {
                 const int around =
                     s[0] | s[1] | s[m] | s[m + 1] | s[m * m] | s[m * m + 1] | s[m * m + m] | s[m * m + m + 1];
                 const Coord origin = node.origin.offsetBy(8 * i, 8 * j, 8 * k);
-                if (around == mixed && !outside(origin))
+                if (around == mixed && !outside(origin) && within_.isInside(origin))
                     out.push_back({origin, static_cast<std::int32_t>(n), place(i, j, k)});
             }
 }

@@ -39,10 +39,13 @@ struct BlockSamples {
 /// children.
 class CrossingBlocks {
  public:
-    /// Throws InvalidInput where a constant tile of 4096³ voxels in the box lies across the isovalue from the
-    /// background, and where a node lies within 256 voxels of an end of the indices.
+    /// Only blocks that begin `within` a box, whose faces lie at multiples of 8, are found. What the tree
+    /// holds further than 8 voxels above it, or below it, tells nothing, so it need not be there.
+    ///
+    /// Throws InvalidInput where a constant tile of 4096³ voxels in the box of the frame lies across the
+    /// isovalue from the background, and where a node lies within 256 voxels of an end of the indices.
     CrossingBlocks(const openvdb::FloatTree& tree, const Frame& frame, float isovalue,
-                   const Progress& progress);
+                   const Progress& progress, const openvdb::CoordBBox& within = openvdb::CoordBBox::inf());
 
     std::size_t size() const { return blocks_.size(); }
     /// Index of the first voxel of block b. The order is fixed by the coordinates alone.
@@ -85,6 +88,7 @@ class CrossingBlocks {
     State sign_state(float value) const { return value >= isovalue_ ? above : below; }
     Place step(const Block& block, int side) const;
     bool outside_box(const openvdb::Coord& origin, int dim) const;
+    bool out_of_reach(const openvdb::Coord& origin, int dim) const;
     void add_nodes(const openvdb::Coord& origin);
     void collect_nodes();
     void classify(Node& node) const;
@@ -97,6 +101,7 @@ class CrossingBlocks {
     const openvdb::FloatTree& tree_;
     const Frame frame_;
     const float isovalue_;
+    const openvdb::CoordBBox within_;
     std::vector<Node> nodes_;
     std::unordered_map<openvdb::Coord, int> node_at_;
     std::vector<Block> blocks_;

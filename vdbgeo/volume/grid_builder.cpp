@@ -42,17 +42,20 @@ void GridBuilder::add_sections(const float* data, int count) {
 void GridBuilder::add_slab(std::vector<SortedStrip>&& strips) {
     for (SortedStrip& strip : strips) {
         totals_.add(strip);
-        for (SortedBlock& block : strip.blocks) {
-            if (block.leaf) {
-                leaves_.push_back(block.leaf.get());
-                grid_->tree().addLeaf(block.leaf.release());
-            } else {
-                grid_->tree().addTile(1, block.origin, block.tile_value,
-                                      block.tile == SortedBlock::Tile::kept);
-            }
-        }
+        add_blocks(std::move(strip.blocks));
     }
     ++slabs_done_;
+}
+
+void GridBuilder::add_blocks(std::vector<SortedBlock>&& blocks) {
+    for (SortedBlock& block : blocks) {
+        if (block.leaf) {
+            leaves_.push_back(block.leaf.get());
+            grid_->tree().addLeaf(block.leaf.release());
+        } else {
+            grid_->tree().addTile(1, block.origin, block.tile_value, block.tile == SortedBlock::Tile::kept);
+        }
+    }
 }
 
 void GridBuilder::fill_background(float background) {
@@ -80,17 +83,21 @@ void GridBuilder::fill_background(float background) {
 }
 
 DensityMap GridBuilder::finish(const Frame& frame) {
-    if (!grid_) throw InvalidInput("the map was handed out already");
     if (slabs_done_ != sorter_.slabs())
         throw InvalidInput(fmt::format("{} of {} slabs were handed over", slabs_done_, sorter_.slabs()));
-    fill_background(totals_.background(sorter_));
+    return finish(frame, totals_);
+}
+
+DensityMap GridBuilder::finish(const Frame& frame, MapTotals& totals) {
+    if (!grid_) throw InvalidInput("the map was handed out already");
+    fill_background(totals.background(sorter_));
     DensityMap map;
     map.grid = std::move(grid_);
     map.grid->setName("density");
     map.grid->setGridClass(openvdb::GRID_UNKNOWN);
     map.frame = frame;
     map.frame.size = sorter_.size();
-    map.statistics = totals_.statistics();
+    map.statistics = totals.statistics();
     store_frame(map);
     return map;
 }

@@ -31,12 +31,17 @@ class GridBuilder {
 
     /// The strips of one slab, from the first row to the last: for a caller that sorts them itself.
     void add_slab(std::vector<SortedStrip>&& strips);
+    /// Blocks alone, without what their strips add to the totals: for a part of a map, whose totals come from
+    /// elsewhere.
+    void add_blocks(std::vector<SortedBlock>&& blocks);
     const StripSorter& sorter() const { return sorter_; }
     const MapTotals& totals() const { return totals_; }
 
     /// The map, with statistics over all samples handed over; once. Throws InvalidInput when sections are
     /// missing.
     DensityMap finish(const Frame& frame);
+    /// The map of the blocks that were handed over, with the totals of the whole.
+    DensityMap finish(const Frame& frame, MapTotals& totals);
 
  private:
     void fill_background(float background);

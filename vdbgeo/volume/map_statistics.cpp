@@ -1,9 +1,13 @@
 #include "vdbgeo/volume/map_statistics.h"
 
 #include <openvdb/tree/LeafManager.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <tuple>
+#include <vector>
 
 #include "vdbgeo/core/parallel.h"
 
@@ -57,22 +61,68 @@ class Sum {
     double shift_ = 0, sum_ = 0, squares_ = 0;
 };
 
-/// Joins `of(leaf)` over all leaves in their order in the tree.
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+/// What lies on one line of leaves along x.
+struct Line {
+    int y, z;
+    Moments moments;
+};
+
+/// So many voxels of tiles have this value.
+struct TileValue {
+    float value;
+    std::uint64_t voxels;
+};
+
+/// Joins `of(leaf)` over the leaves: along x first, then the lines by y and z.
 template <class Of>
-Moments over_leaves(const openvdb::FloatTree& tree, const Of& of) {
-    const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree);
-    return fixed_order_reduce(
-        leaves.leafCount(), leaves_together, Moments(),
-        [&](std::size_t begin, std::size_t end) {
-            Moments m;
-            for (std::size_t i = begin; i < end; ++i) m.join(of(leaves.leaf(i)));
-            return m;
-        },
-        [](Moments& all, const Moments& part) { all.join(part); });
+Moments over_leaves(const openvdb::FloatTree& tree, const MapShare& share, const Of& of) {
+    std::vector<const Leaf*> leaves;
+    for (auto it = tree.cbeginLeaf(); it; ++it)
+        if (!share.team || share.own.isInside(it->origin())) leaves.push_back(&*it);
+    tbb::parallel_sort(leaves.begin(), leaves.end(), [](const Leaf* a, const Leaf* b) {
+        const Coord p = a->origin(), q = b->origin();
+        return std::make_tuple(p.y(), p.z(), p.x()) < std::make_tuple(q.y(), q.z(), q.x());
+    });
+    std::vector<std::size_t> begins;
+    for (std::size_t i = 0; i < leaves.size(); ++i)
+        if (i == 0 || leaves[i]->origin().y() != leaves[i - 1]->origin().y() ||
+            leaves[i]->origin().z() != leaves[i - 1]->origin().z())
+            begins.push_back(i);
+    std::vector<Line> lines(begins.size());
+    parallel_for(lines.size(), 1, [&](std::size_t l) {
+        const std::size_t end = l + 1 < begins.size() ? begins[l + 1] : leaves.size();
+        lines[l] = {leaves[begins[l]]->origin().y(), leaves[begins[l]]->origin().z(), {}};
+        for (std::size_t i = begins[l]; i < end; ++i) lines[l].moments.join(of(*leaves[i]));
+    });
+    if (share.team) {
+        lines = gather_all(*share.team, lines);
+        std::sort(lines.begin(), lines.end(),
+                  [](const Line& a, const Line& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+    }
+    Moments all;
+    for (const Line& line : lines) all.join(line.moments);
+    return all;
 }
 
-Moments moments_in_box(const openvdb::FloatTree& tree, const CoordBBox& box) {
-    Moments all = over_leaves(tree, [&](const openvdb::FloatTree::LeafNodeType& leaf) {
+/// Joins tiles by their value, the lowest first.
+void join_tiles(std::vector<TileValue> tiles, const MapShare& share, Moments& all) {
+    if (share.team) tiles = gather_all(*share.team, tiles);
+    std::sort(tiles.begin(), tiles.end(), [](const TileValue& a, const TileValue& b) {
+        return a.value < b.value || (std::isnan(b.value) && !std::isnan(a.value));
+    });
+    for (std::size_t i = 0; i < tiles.size();) {
+        std::uint64_t voxels = 0;
+        const float value = tiles[i].value;
+        do voxels += tiles[i++].voxels;
+        while (i < tiles.size() && !(tiles[i].value != value));
+        all.join(many(value, voxels));
+    }
+}
+
+Moments moments_in_box(const openvdb::FloatTree& tree, const CoordBBox& box, const MapShare& share) {
+    Moments all = over_leaves(tree, share, [&](const Leaf& leaf) {
         const CoordBBox own = leaf.getNodeBoundingBox();
         CoordBBox inside = own;
         inside.intersect(box);
@@ -85,38 +135,51 @@ Moments moments_in_box(const openvdb::FloatTree& tree, const CoordBBox& box) {
         }
         return sum.moments();
     });
+    std::vector<TileValue> tiles;
     auto tile = tree.cbeginValueAll();
     tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         CoordBBox inside;
         tile.getBoundingBox(inside);
         inside.intersect(box);
-        if (!inside.empty()) all.join(many(*tile, inside.volume()));
+        // A node's tiles of the background may lie in several shares: they are told with what has no node.
+        if (share.team) inside.intersect(share.own);
+        const float value = *tile, background = tree.background();
+        if (!inside.empty() && std::memcmp(&value, &background, sizeof value) != 0)
+            tiles.push_back({value, inside.volume()});
     }
+    join_tiles(std::move(tiles), share, all);
     return all;
 }
 
 }  // namespace
 
-Statistics statistics_of(const DensityMap& map) {
-    if (!map.frame.bounded()) return active_moments(*map.grid).statistics();
+Statistics statistics_of(const DensityMap& map, const MapShare& share) {
+    if (!map.frame.bounded()) return active_moments(*map.grid, share).statistics();
     const Vec3i& n = map.frame.size;
     const CoordBBox box(Coord(0, 0, 0), Coord(n.x() - 1, n.y() - 1, n.z() - 1));
-    Moments all = moments_in_box(map.grid->constTree(), box);
+    Moments all = moments_in_box(map.grid->constTree(), box, share);
     const std::uint64_t seen = all.count + all.non_finite, samples = box.volume();
-    if (samples > seen) all.join(many(map.grid->background(), samples - seen));  // where the tree has no node
+    if (samples > seen) all.join(many(map.grid->background(), samples - seen));
     return all.statistics();
 }
 
-Moments active_moments(const openvdb::FloatGrid& grid) {
-    Moments all = over_leaves(grid.constTree(), [](const openvdb::FloatTree::LeafNodeType& leaf) {
+Moments active_moments(const openvdb::FloatGrid& grid, const MapShare& share) {
+    Moments all = over_leaves(grid.constTree(), share, [](const Leaf& leaf) {
         Sum sum;
         for (auto it = leaf.cbeginValueOn(); it; ++it) sum.add(*it);
         return sum.moments();
     });
+    std::vector<TileValue> tiles;
     auto tile = grid.constTree().cbeginValueOn();
     tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) all.join(many(*tile, tile.getVoxelCount()));
+    for (; tile; ++tile) {
+        CoordBBox inside;
+        tile.getBoundingBox(inside);
+        if (share.team) inside.intersect(share.own);
+        if (!inside.empty()) tiles.push_back({*tile, inside.volume()});
+    }
+    join_tiles(std::move(tiles), share, all);
     return all;
 }
 

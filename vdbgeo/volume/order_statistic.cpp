@@ -96,13 +96,19 @@ struct OrderStatistic::State {
     tbb::enumerable_thread_specific<Counts> counts;
 
     /// The threads' counts together, which are empty afterwards.
-    std::vector<std::uint64_t> gather(std::uint32_t& low_bits) {
+    std::vector<std::uint64_t> gather(std::uint32_t& low_bits, Team* team) {
         std::vector<std::uint64_t> sum(bins);
         for (const Counts& c : counts) {
             low_bits |= c.low_bits;
             for (std::size_t b = 0; b < bins; ++b) sum[b] += c.tables[b] + c.tables[bins + b];
         }
         counts.clear();
+        if (!team) return sum;
+        // The bits that were set anywhere: how often each was.
+        for (int b = 0; b < 16; ++b) sum.push_back(low_bits >> b & 1);
+        team->add_up(sum);
+        for (std::size_t b = 0; b < 16; ++b) low_bits |= sum[bins + b] > 0 ? 1u << b : 0;
+        sum.resize(bins);
         return sum;
     }
 
@@ -112,9 +118,9 @@ struct OrderStatistic::State {
         return static_cast<std::uint32_t>(begin);
     }
 
-    void end_first() {
+    void end_first(Team* team) {
         std::uint32_t low_bits = 0;
-        const std::vector<std::uint64_t> sum = gather(low_bits);
+        const std::vector<std::uint64_t> sum = gather(low_bits, team);
         for (std::size_t b = first_finite; b < end_finite; ++b) count += sum[b];
         done = count == 0;
         if (done) return;
@@ -129,9 +135,9 @@ struct OrderStatistic::State {
         done = low_bits == 0;
     }
 
-    void end_second() {
+    void end_second(Team* team) {
         std::uint32_t low_bits = 0;
-        const std::vector<std::uint64_t> sum = gather(low_bits);
+        const std::vector<std::uint64_t> sum = gather(low_bits, team);
         std::uint64_t seen = 0;
         for (const std::uint64_t n : sum) seen += n;
         if (seen != in_chosen)
@@ -165,10 +171,10 @@ void OrderStatistic::add(const float* values, std::size_t count) {
     parallel_blocks(count, block, take);
 }
 
-void OrderStatistic::end_pass() {
+void OrderStatistic::end_pass(Team* team) {
     State& s = *state_;
     if (s.done) return;
-    s.pass == 0 ? s.end_first() : s.end_second();
+    s.pass == 0 ? s.end_first(team) : s.end_second(team);
     ++s.pass;
 }
 

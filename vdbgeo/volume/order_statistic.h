@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "vdbgeo/core/team.h"
+
 namespace vdbgeo {
 
 /// The sample of rank ceil(fraction · n) − 1 (at least 0) among the n finite samples in ascending order: what
@@ -36,9 +38,9 @@ class OrderStatistic {
     /// Counts samples, in parallel where they are many. May be called from several threads at once.
     void add(const float* values, std::size_t count);
 
-    /// All samples of this pass have been added. Throws InvalidInput when they were not those of the first
-    /// pass.
-    void end_pass();
+    /// All samples of this pass have been added, by all members where there is a team. Throws InvalidInput
+    /// when they were not those of the first pass.
+    void end_pass(Team* team = nullptr);
 
     /// Nothing is left to find: further samples are not looked at.
     bool done() const;

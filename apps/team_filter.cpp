@@ -1,0 +1,107 @@
+#include "apps/team_filter.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/map_output.h"
+#include "apps/stages.h"
+#include "converters/map_part.h"
+#include "converters/map_parts.h"
+#include "vdbgeo/blocks/partition.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/map_statistics.h"
+
+namespace vdbgeo::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+openvdb::CoordBBox box_of(const Frame& frame) {
+    return {openvdb::Coord(0), openvdb::Coord(frame.size.x(), frame.size.y(), frame.size.z()).offsetBy(-1)};
+}
+
+fs::path folder_of_parts(const std::string& out) {
+    return has_ending(out, ".parts") ? fs::path(out) : fs::path(out + ".parts");
+}
+
+}  // namespace
+
+void wait_for_all(Team& team) { gather_all(team, std::vector<char>{}); }
+
+MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session) {
+    Team& team = *session.team;
+    const openvdb::CoordBBox box = box_of(map_frame(in, options));
+    MapOfTeam map;
+    map.share = {&team, partition(box, parts_for(box, team.size())), halo};
+    const MapPart part{&team, map.share.own(), map.share.with_ghosts(team.rank())};
+    map.in = read_map_part(in, options, part, session.stage("reading"));
+    for (const std::string& w : map.in.warnings) session.warn(in + ": " + w);
+    if (!session.json && !session.quiet)
+        for (const std::string& note : map.in.notes) session.say(in + ": " + note);
+    return map;
+}
+
+MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session) {
+    MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
+    const Moments kept = active_moments(*map.in.map.grid, {session.team, map.share.own()});
+    if (kept.non_finite > 0)
+        throw InvalidInput(fmt::format(
+            "{}: {} of the samples are not finite numbers; --threshold or --mask can leave them out",
+            flags.in, kept.non_finite));
+    if (kept.count == 0)
+        throw NumericalError(fmt::format(
+            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
+            flags.in, map.in.map.statistics.min, map.in.map.statistics.max));
+    return map;
+}
+
+void finish_map(DensityMap& map, const std::string& history, const stencil::Share& share) {
+    map.statistics = statistics_of(map, {share.team, share.own()});
+    note_new_values(map, history);
+}
+
+void check_team_output(const MapFilterFlags& flags) {
+    if (flags.out == "-") throw UsageError("-: members of a team write files, not to standard output");
+    if (has_ending(flags.out, ".nvdb"))
+        throw UsageError(fmt::format("{}: a team writes .vdb, map files or a folder .parts", flags.out));
+    if (!flags.preview.empty()) throw UsageError("--preview: a team draws no pictures");
+}
+
+void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const stencil::Share& share,
+                   Json& result, Session& session) {
+    Team& team = *share.team;
+    const fs::path folder = folder_of_parts(flags.out);
+    const Progress progress = session.stage("writing");
+    if (team.rank() == 0) {
+        std::error_code error;
+        fs::remove_all(folder, error);
+        fs::create_directories(folder, error);
+        if (error) throw IoError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+    }
+    wait_for_all(team);
+    write_map_part(map, share.own(), team.rank(), folder, flags.vdb, progress.part(0, 0.4));
+    wait_for_all(team);
+    if (team.rank() == 0 && folder != fs::path(flags.out)) {
+        const auto report =
+            merge_parts(folder, flags.out, flags.map.options, flags.vdb, flags.mrc, progress.part(0.4, 1));
+        session.end_stage();
+        if (report) report_written(flags.out, *report, result, session);
+        std::error_code error;
+        fs::remove_all(folder, error);
+    }
+    wait_for_all(team);
+    session.end_stage();
+}
+
+std::optional<MrcWriteReport> merge_parts(const fs::path& folder, const std::string& out,
+                                          const MapReadOptions& read, const VdbWriteOptions& vdb,
+                                          const MrcWriteOptions& mrc, const Progress& progress) {
+    const MapParts parts(folder);
+    if (!has_ending(out, ".vdb")) return parts.write_mrc(out, mrc, progress);
+    parts.write_vdb(out, vdb, read.memory_limit() / 4,
+                    read.scratch.empty() ? fs::absolute(out).parent_path() : read.scratch, progress);
+    return std::nullopt;
+}
+
+}  // namespace vdbgeo::app

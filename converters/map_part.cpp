@@ -1,0 +1,142 @@
+#include "converters/map_part.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "converters/map_passes.h"
+#include "vdbgeo/core/errors.h"
+
+namespace vdbgeo {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+/// What a strip adds to the totals of a map, and where it lies in the file.
+struct StripTotal {
+    int slab, row;
+    Moments moments;
+    RoundingError rounding;
+    std::uint64_t border;  // samples of the border, which follow apart
+};
+
+/// The totals of the strips that members own, put together in file order.
+class TotalsOfAll {
+ public:
+    void add(int slab, int row, const SortedStrip& strip) {
+        strips_.push_back({slab, row, strip.moments, strip.rounding, strip.border.size()});
+        border_.insert(border_.end(), strip.border.begin(), strip.border.end());
+    }
+
+    MapTotals gather(Team& team) const {
+        const std::vector<StripTotal> strips = gather_all(team, strips_);
+        const std::vector<float> border = gather_all(team, border_);
+        struct Place {
+            const StripTotal* strip;
+            const float* border;
+        };
+        std::vector<Place> places;
+        const float* at = border.data();
+        for (const StripTotal& s : strips) {
+            places.push_back({&s, at});
+            at += s.border;
+        }
+        std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+            return std::tie(a.strip->slab, a.strip->row) < std::tie(b.strip->slab, b.strip->row);
+        });
+        MapTotals totals;
+        for (const Place& p : places) {
+            SortedStrip strip;
+            strip.moments = p.strip->moments;
+            strip.rounding = p.strip->rounding;
+            strip.border.assign(p.border, p.border + p.strip->border);
+            totals.add(strip);
+        }
+        return totals;
+    }
+
+ private:
+    std::vector<StripTotal> strips_;
+    std::vector<float> border_;
+};
+
+/// Rows of blocks from low to high along an axis of the file, as far as the map goes.
+std::pair<int, int> blocks_along(int axis, const CoordBBox& box, const Vec3i& size) {
+    const int begin = std::max(box.min()[axis], 0), end = std::min(box.max()[axis] + 1, size[axis]);
+    if (begin >= end) return {0, 0};
+    return {begin / leaf::dim, (end - 1) / leaf::dim + 1};
+}
+
+MapFile read_mrc_part(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
+                      const Progress& progress) {
+    MapPasses passes(path, options);
+    const double before = 1 - 1.0 / passes.passes();
+    passes.prepare(progress.part(0, before));
+    const Vec3i size = passes.sorter().size();
+    const auto order = passes.sorter().order();
+    const auto [first_row, end_row] = blocks_along(order[1], part.wanted, size);
+    const auto [first_slab, end_slab] = blocks_along(order[2], part.wanted, size);
+    passes.source().restrict_to({first_row, end_row, first_slab, end_slab});
+    GridBuilder builder(size, order, passes.sparsify(), passes.keep());
+    TotalsOfAll totals;
+    int slab = first_slab, row = first_row;
+    const auto take = [&](std::vector<SortedStrip>&& strips) {
+        for (SortedStrip& strip : strips) {
+            Coord first;  // of the strip's first block
+            first[order[1]] = row * leaf::dim;
+            first[order[2]] = slab * leaf::dim;
+            if (part.own.isInside(first)) totals.add(slab, row, strip);
+            auto& blocks = strip.blocks;
+            blocks.erase(
+                std::remove_if(blocks.begin(), blocks.end(),
+                               [&](const SortedBlock& b) {
+                                   return !part.wanted.hasOverlap(CoordBBox::createCube(b.origin, leaf::dim));
+                               }),
+                blocks.end());
+            builder.add_blocks(std::move(blocks));
+            if (++row == end_row) row = first_row, ++slab;
+        }
+    };
+    if (first_row < end_row && first_slab < end_slab)
+        passes.sort([](SortedStrip&& strip) { return std::move(strip); }, take, progress.part(before, 1));
+    MapTotals all = totals.gather(*part.team);
+    MapFile result;
+    result.rounding = all.rounding();
+    result.map = builder.finish(passes.source().frame(), all);
+    finish_map_file(passes, result);
+    return result;
+}
+
+MapFile part_of_vdb(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part) {
+    MapFile whole = read_map(path, options);
+    openvdb::FloatTree& tree = whole.map.grid->tree();
+    if (tree.hasActiveTiles()) tree.voxelizeActiveTiles();
+    const auto kept = whole.map.grid->copyWithNewTree();
+    kept->setTransform(whole.map.grid->transformPtr());  // a copy of it rounds its scale
+    for (auto it = tree.beginLeaf(); it; ++it)
+        if (part.wanted.hasOverlap(it->getNodeBoundingBox())) kept->tree().addLeaf(new leaf::Leaf(*it));
+    whole.map.grid = kept;
+    return whole;
+}
+
+}  // namespace
+
+Frame map_frame(const std::filesystem::path& path, const MapReadOptions& options) {
+    options.check();
+    if (!is_vdb_file(path)) return StripSource(path, options, 1).frame();
+    const Frame frame = read_map(path, options).map.frame;
+    if (!frame.bounded())
+        throw InvalidInput(path.string() +
+                           ": the grid has no box, which parts of it need; vdbgeo convert makes one");
+    return frame;
+}
+
+MapFile read_map_part(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
+                      const Progress& progress) {
+    options.check();
+    if (path == "-") throw InvalidInput("-: parts are read from a file, not from a pipe");
+    return is_vdb_file(path) ? part_of_vdb(path, options, part)
+                             : read_mrc_part(path, options, part, progress);
+}
+
+}  // namespace vdbgeo

@@ -1,0 +1,209 @@
+#include "converters/map_parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "converters/mrc_sink.h"
+#include "converters/streamed_grid.h"
+#include "converters/vdb_sections.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+
+namespace vdbgeo {
+namespace {
+
+namespace fs = std::filesystem;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+
+constexpr const char *box_begin = "vdbgeo_part_begin", *box_end = "vdbgeo_part_end";
+
+bool is_part(const fs::path& file) {
+    const std::string name = file.filename().string();
+    return name.rfind("part_", 0) == 0 && file.extension() == ".vdb";
+}
+
+std::vector<fs::path> part_files(const fs::path& folder) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error))
+        if (is_part(entry.path())) files.push_back(entry.path());
+    if (error) throw IoError(fmt::format("{}: cannot be listed: {}", folder.string(), error.message()));
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+CoordBBox box_of_part(const VdbSections& part, const fs::path& file) {
+    const auto at = [&](const char* name) {
+        const auto entry = part.grid().getMetadata<openvdb::Vec3IMetadata>(name);
+        if (!entry)
+            throw InvalidInput(
+                fmt::format("{}: its metadata lack {}: it is no part of a map", file.string(), name));
+        return Coord(entry->value());
+    };
+    return {at(box_begin), at(box_end)};
+}
+
+}  // namespace
+
+void write_map_part(const DensityMap& map, const CoordBBox& own, int number, const fs::path& folder,
+                    const VdbWriteOptions& options, const Progress& progress) {
+    const openvdb::FloatGrid::Ptr part = map.grid->copyWithNewTree();
+    part->setTransform(map.grid->transformPtr());  // a copy of it rounds its scale
+    const openvdb::FloatTree& tree = map.grid->constTree();
+    for (auto it = tree.cbeginLeaf(); it; ++it)
+        if (own.isInside(it->origin())) part->tree().addLeaf(new leaf::Leaf(*it));
+    auto tile = tree.cbeginValueAll();
+    tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!tile.isValueOn() && *tile == tree.background()) continue;
+        CoordBBox inside;
+        tile.getBoundingBox(inside);
+        inside.intersect(own);
+        for (auto at = inside.begin(); at != inside.end(); ++at)
+            if (((*at).x() & 7) == 0 && ((*at).y() & 7) == 0 && ((*at).z() & 7) == 0)
+                part->tree().addTile(1, *at, *tile, tile.isValueOn());
+    }
+    part->insertMeta(box_begin, openvdb::Vec3IMetadata(own.min().asVec3i()));
+    part->insertMeta(box_end, openvdb::Vec3IMetadata(own.max().asVec3i()));
+    write_vdb({part}, folder / fmt::format("part_{:04}.vdb", number), options, progress);
+}
+
+bool is_map_parts(const fs::path& path) {
+    std::error_code error;
+    if (!fs::is_directory(path, error)) return false;
+    const auto files = fs::directory_iterator(path, error);
+    return !error && std::any_of(begin(files), end(files), [](const auto& f) { return is_part(f.path()); });
+}
+
+struct MapParts::State {
+    std::vector<VdbSections> parts;
+    std::vector<CoordBBox> boxes;
+    openvdb::MetaMap meta;
+    CoordBBox active_box;
+    std::uint64_t active_voxels = 0;
+
+    float background() const { return parts[0].grid().background(); }
+    std::size_t part_at(const Coord& corner) const {
+        std::size_t i = 0;
+        while (i < boxes.size() && !boxes[i].isInside(corner)) ++i;
+        return i;
+    }
+    /// Leaves of all parts, for one thread.
+    VdbSections::Leaves leaf_reader() const;
+};
+
+VdbSections::Leaves MapParts::State::leaf_reader() const {
+    const auto readers = std::make_shared<std::vector<VdbSections::Leaves>>(parts.size());
+    return [this, readers](const Coord& corner, float& tile) -> const leaf::Leaf* {
+        const std::size_t i = part_at(corner);
+        if (i == parts.size()) {
+            tile = background();
+            return nullptr;
+        }
+        if (!(*readers)[i]) (*readers)[i] = parts[i].leaf_reader();
+        return (*readers)[i](corner, tile);
+    };
+}
+
+MapParts::MapParts(const fs::path& folder) : state_(std::make_unique<State>()) {
+    State& s = *state_;
+    for (const fs::path& file : part_files(folder)) {
+        s.parts.emplace_back(file);
+        const VdbSections& part = s.parts.back();
+        const CoordBBox box = box_of_part(part, file);
+        for (const CoordBBox& other : s.boxes)
+            if (other.hasOverlap(box))
+                throw InvalidInput(fmt::format("{}: its box overlaps another part's", file.string()));
+        s.boxes.push_back(box);
+        const Frame &first = s.parts[0].frame(), &here = part.frame();
+        if (first.size != here.size || first.origin != here.origin || first.axes != here.axes ||
+            s.background() != part.grid().background())
+            throw InvalidInput(fmt::format("{}: it is no part of the same map as the first", file.string()));
+        s.active_voxels += part.active_voxels();
+        if (part.active_voxels() > 0) s.active_box.expand(part.active_box());
+    }
+    if (s.parts.empty())
+        throw InvalidInput(folder.string() + ": there are no parts of a map (part_0000.vdb …)");
+    s.meta = static_cast<const openvdb::MetaMap&>(s.parts[0].grid());
+    for (const char* name : {box_begin, box_end}) s.meta.removeMeta(name);
+}
+
+MapParts::~MapParts() = default;
+MapParts::MapParts(MapParts&&) noexcept = default;
+
+const Frame& MapParts::frame() const { return state_->parts[0].frame(); }
+std::uint64_t MapParts::active_voxels() const { return state_->active_voxels; }
+std::size_t MapParts::parts() const { return state_->parts.size(); }
+
+MrcWriteReport MapParts::write_mrc(const fs::path& path, const MrcWriteOptions& options,
+                                   const Progress& progress) const {
+    const State* const s = state_.get();
+    const auto lookup = [s]() -> LeafLookup {
+        return [leaves = s->leaf_reader()](const Coord& corner, float& tile) -> const float* {
+            const leaf::Leaf* found = leaves(corner, tile);
+            return found ? found->buffer().data() : nullptr;
+        };
+    };
+    return write_mrc_from(
+        s->meta, frame(), s->active_box, path, options,
+        [&](const MrcBox& box, const std::array<int, 3>& order) {
+            return DenseSections(lookup, box.first, box.frame.size, order);
+        },
+        progress);
+}
+
+void MapParts::write_vdb(const fs::path& path, const VdbWriteOptions& options, std::uint64_t memory,
+                         const fs::path& scratch, const Progress& progress) const {
+    const State& s = *state_;
+    SparsifyOptions any_value;  // inactive values may be any: as with a band
+    any_value.threshold = 0.0f;
+    any_value.band = 1.0f;
+    const StripSorter sorter(frame().size, {0, 1, 2}, any_value);
+    const auto leaves = std::make_shared<PackedLeaves>(sorter, options, memory, scratch);
+    const Vec3i size = frame().size;
+    const float background = s.background();
+    const auto strip_at = [&](int slab, int row) {
+        const VdbSections::Leaves reader = s.leaf_reader();
+        SortedStrip strip;
+        for (int x = 0; x < size.x(); x += leaf::dim) {
+            const Coord corner(x, row * leaf::dim, slab * leaf::dim);
+            float tile = background;
+            SortedBlock block;
+            block.origin = corner;
+            if (const leaf::Leaf* found = reader(corner, tile)) {
+                block.leaf = std::make_unique<leaf::Leaf>(*found);
+                float* values = block.leaf->buffer().data();
+                for (auto it = block.leaf->beginValueOff(); it; ++it)
+                    if (values[it.pos()] == background) values[it.pos()] = StripSorter::unknown_background;
+            } else {
+                const bool on = s.part_at(corner) < s.parts.size() &&
+                                s.parts[s.part_at(corner)].grid().tree().isValueOn(corner);
+                if (!on && tile == background) continue;
+                block.tile = on ? SortedBlock::Tile::kept : SortedBlock::Tile::above;
+                block.tile_value = tile;
+            }
+            strip.blocks.push_back(std::move(block));
+        }
+        return strip;
+    };
+    for (int slab = 0; slab < sorter.slabs(); ++slab) {
+        std::vector<std::shared_ptr<const PackedLeaves::Row>> rows(
+            static_cast<std::size_t>(sorter.strips_in_slab()));
+        parallel_for(rows.size(), 1, [&](std::size_t row) {
+            rows[row] = leaves->pack(strip_at(slab, static_cast<int>(row)));
+        });
+        leaves->add_slab(rows);
+        progress.part(0, 0.6).report(double(slab + 1) / sorter.slabs());
+    }
+    const auto grid = std::make_shared<StreamedGrid>(leaves, background);
+    static_cast<openvdb::MetaMap&>(*grid) = s.meta;
+    // Shared: a copy of a transform rounds its scale.
+    grid->setTransform(
+        std::const_pointer_cast<openvdb::math::Transform>(s.parts[0].grid().constTransformPtr()));
+    vdbgeo::write_vdb({grid}, path, options, progress.part(0.6, 1));
+}
+
+}  // namespace vdbgeo

@@ -1,0 +1,50 @@
+// A map in a folder of VDB files, each a part of it: how members of a team write what is too large for one.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "converters/mrc.h"
+#include "converters/vdb_file.h"
+#include "vdbgeo/core/progress.h"
+
+namespace vdbgeo {
+
+/// Writes the leaves and tiles of a map that lie in `own` (indices, ends included, at multiples of 8) as part
+/// `number` of the folder, which must be there: part_0003.vdb. Its metadata tell the box. Errors as
+/// write_vdb.
+void write_map_part(const DensityMap& map, const openvdb::CoordBBox& own, int number,
+                    const std::filesystem::path& folder, const VdbWriteOptions& options = {},
+                    const Progress& progress = {});
+
+/// Whether that is a folder of parts.
+bool is_map_parts(const std::filesystem::path& path);
+
+/// The parts of a folder as one map, whose voxels stay in the files.
+class MapParts {
+ public:
+    /// Opens all parts. InvalidInput where there are none, where they differ in frame or background, or where
+    /// their boxes overlap; errors as VdbSections. Memory: as VdbSections for each.
+    explicit MapParts(const std::filesystem::path& folder);
+    ~MapParts();
+    MapParts(MapParts&&) noexcept;
+
+    const Frame& frame() const;
+    std::uint64_t active_voxels() const;
+    std::size_t parts() const;
+
+    /// Writes the whole as write_mrc does, to the same bytes: eight sections in memory.
+    MrcWriteReport write_mrc(const std::filesystem::path& path, const MrcWriteOptions& options = {},
+                             const Progress& progress = {}) const;
+    /// Writes the whole as write_vdb does, to the same bytes. `memory`: bytes of packed leaves to hold, the
+    /// rest goes through a temporary file in `scratch` (StreamedGrid).
+    void write_vdb(const std::filesystem::path& path, const VdbWriteOptions& options, std::uint64_t memory,
+                   const std::filesystem::path& scratch, const Progress& progress = {}) const;
+
+ private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace vdbgeo

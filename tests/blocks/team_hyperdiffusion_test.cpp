@@ -1,0 +1,160 @@
+// Hyperdiffusion by a team gives each voxel the bits that it gets in one grid.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "tests/support/grids.h"
+#include "tests/support/thread_team.h"
+#include "vdbgeo/blocks/partition.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/diffusion_solver.h"
+#include "vdbgeo/flow/hyperdiffusion.h"
+
+namespace vdbgeo {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+
+const CoordBBox whole(Coord(-20, -40, -60), Coord(90, 110, 200));
+
+/// A dense ball in noise, with a hole where nothing is active and sparse leaves around it.
+FloatGrid::Ptr noisy_map() {
+    test::SparseMaker make(7);
+    auto grid = make.grid();
+    auto to = grid->getAccessor();
+    for (auto c = whole.begin(); c; ++c) {
+        const Coord at = *c;
+        const Vec3d p(at.x() - 30, at.y() - 35, 0.6 * (at.z() - 70));
+        const double r = p.norm();
+        if (r > 75 || (r < 12 && at.x() > 30)) continue;
+        if (r > 68 && make.uniform() < 0.5) continue;
+        to.setValueOn(at, static_cast<float>((r < 45 ? 1 : 0) + make.uniform() - 0.5 + 10));
+    }
+    return grid;
+}
+
+struct Setting {
+    const char* name;
+    HyperdiffusionOptions options;
+};
+
+std::vector<Setting> settings() {
+    const auto with = [](int order, const std::string& sigma) {
+        HyperdiffusionOptions o;
+        o.terms = {{order, 1.0}};
+        o.sigma = EdgeScale::parse(sigma);
+        o.steps = order == 0 ? 40 : 22;
+        return o;
+    };
+    std::vector<Setting> all{{"q0 local", with(0, "local")},      {"q0 global", with(0, "global")},
+                             {"q1 local:3", with(1, "local:3")},  {"q1 global", with(1, "global")},
+                             {"q2 local:8", with(2, "local:8")},  {"q2 inf", with(2, "inf")},
+                             {"q1 until done", with(1, "global")}};
+    all.back().options.steps.reset();
+    all.push_back({"q0+q1 euler, fidelity", with(1, "local")});
+    all.back().options.terms = {{0, 0.5}, {1, 1.0}};
+    all.back().options.stepper = Stepper::euler;
+    all.back().options.steps = 7;
+    all.back().options.fidelity = 0.1;
+    return all;
+}
+
+class TeamHyperdiffusion : public ::testing::TestWithParam<std::pair<int, int>> {};
+
+TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
+    static const FloatGrid::Ptr input = noisy_map();
+    const auto boxes = partition(whole, GetParam());
+    for (const Setting& setting : settings()) {
+        SCOPED_TRACE(setting.name);
+        static std::map<std::string, std::pair<FloatGrid::Ptr, HyperdiffusionReport>> in_one;
+        auto& [expected, alone] = in_one[setting.name];
+        if (!expected) {
+            expected = input->deepCopy();
+            alone = hyperdiffuse(*expected, setting.options);
+        }
+        std::mutex mutex;
+        std::uint64_t different = 0, seen = 0;
+        test::ThreadTeam(static_cast<int>(boxes.size())).run([&, grid = expected, told = alone](Team& team) {
+            const stencil::Share share{&team, boxes, hyperdiffusion_halo(setting.options)};
+            const FloatGrid::Ptr part = part_of(*input, share.with_ghosts(team.rank()));
+            const HyperdiffusionReport report = hyperdiffuse(*part, setting.options, {}, &share);
+            const std::lock_guard<std::mutex> lock(mutex);
+            EXPECT_EQ(report.steps, told.steps);
+            EXPECT_EQ(report.time, told.time);
+            EXPECT_EQ(report.noise, told.noise);
+            EXPECT_EQ(report.removed, told.removed);
+            EXPECT_EQ(report.mean_after, told.mean_after);
+            EXPECT_EQ(report.active_voxels, told.active_voxels);
+            for (auto it = part->cbeginValueOn(); it; ++it) {
+                const float wanted = grid->tree().getValue(it.getCoord());
+                different += std::memcmp(&*it, &wanted, sizeof wanted) != 0;
+                seen += share.own().isInside(it.getCoord());
+            }
+        });
+        EXPECT_EQ(different, 0u);
+        EXPECT_EQ(seen, expected->activeVoxelCount());
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shares, TeamHyperdiffusion,
+                         ::testing::Values(std::pair(1, 1), std::pair(2, 1), std::pair(1, 2), std::pair(2, 2),
+                                           std::pair(5, 1), std::pair(6, 3)),
+                         [](const auto& p) {
+                             return std::to_string(p.param.first) + "_by_" + std::to_string(p.param.second);
+                         });
+
+/// Bytes of an exchange: those of the own leaves in the halos of others, for each field.
+TEST(TeamHyperdiffusionTraffic, IsWhatTheHalosHold) {
+    const FloatGrid::Ptr input = noisy_map();
+    HyperdiffusionOptions o;
+    o.terms = {{1, 1.0}};
+    o.steps = 20;
+    o.min_cycles = 1;
+    o.cycle = 20;
+    const auto boxes = partition(whole, {3, 1});
+    std::mutex mutex;
+    test::ThreadTeam(3).run([&](Team& team) {
+        const stencil::Share share{&team, boxes, hyperdiffusion_halo(o)};
+        const FloatGrid::Ptr part = part_of(*input, share.with_ghosts(team.rank()));
+        std::uint64_t leaves = 0;
+        for (int r = 0; r < 3; ++r)
+            for (auto it = input->tree().cbeginLeaf(); it; ++it)
+                leaves += r != team.rank() && share.own().isInside(it->origin()) &&
+                          share.with_ghosts(r).hasOverlap(it->getNodeBoundingBox());
+        const HyperdiffusionReport report = hyperdiffuse(*part, o, {}, &share);
+        // The diffusivity; u and its predecessor after each sweep of four steps, u alone after the last.
+        const std::lock_guard<std::mutex> lock(mutex);
+        EXPECT_EQ(report.bytes_sent, leaves * 2048 * (1 + 4 * 2 + 1));
+        EXPECT_GT(leaves, 0u);
+    });
+}
+
+TEST(TeamHyperdiffusionErrors, AreToldByAll) {
+    const FloatGrid::Ptr input = noisy_map();
+    const auto boxes = partition(whole, {2, 1});
+    HyperdiffusionOptions o;
+    o.steps = 3;
+    const auto run = [&](int halo, const HyperdiffusionOptions& options, const FloatGrid& grid) {
+        test::ThreadTeam(2).run([&](Team& team) {
+            const stencil::Share share{&team, boxes, halo};
+            hyperdiffuse(*part_of(grid, share.with_ghosts(team.rank())), options, {}, &share);
+        });
+    };
+    EXPECT_THROW(run(0, o, *input), InvalidInput);
+    HyperdiffusionOptions adi = o;
+    adi.stepper = Stepper::adi;
+    EXPECT_THROW(run(8, adi, *input), InvalidInput);
+    // One voxel that is no number, in one part: both refuse.
+    const FloatGrid::Ptr odd = input->deepCopy();
+    odd->tree().setValueOn(Coord(30, 70, 70), std::nanf(""));
+    EXPECT_THROW(run(8, o, *odd), InvalidInput);
+    // Nothing at all is nothing to do.
+    EXPECT_NO_THROW(run(8, o, *test::empty_grid()));
+}
+
+}  // namespace
+}  // namespace vdbgeo

@@ -1,0 +1,136 @@
+// vdbgeo-mpi under mpirun: the bytes of vdbgeo, for any number of processes.
+#include "tests/cli/cli_test.h"
+
+using namespace vdbgeo::test;
+
+#ifdef VDBGEO_MPI_PROGRAM
+
+namespace {
+
+namespace fs = std::filesystem;
+
+class Mpi : public Cli {
+ protected:
+    void SetUp() override {
+        if (sanitized) GTEST_SKIP() << "NOT TESTED: mpirun and sanitizers do not go together";
+        const Ended probe = mpi(2, {"denoise", "--help"});
+        if (probe.code != 0) GTEST_SKIP() << "NOT TESTED: mpirun starts no processes here: " << probe.err;
+    }
+
+    /// mpirun with so many processes of so many threads.
+    static Ended mpi(int processes, const Words& words, int threads = 1) {
+        Words all{MPIRUN_PROGRAM, "-q", "--allow-run-as-root",     "--oversubscribe", "--bind-to",
+                  "none",         "-n", std::to_string(processes), VDBGEO_MPI_PROGRAM};
+        all.insert(all.end(), words.begin(), words.end());
+        all.insert(all.end(), {"-j", std::to_string(threads)});
+        return run(all);
+    }
+
+    /// A noisy map of five by two cells.
+    std::string noisy() { return phantom("a.mrc", 160, {"--snr", "0.5"}, "atpase"); }
+
+    /// The same command by vdbgeo and by so many processes.
+    void expect_same(const Words& words, const std::string& ending, const std::vector<int>& processes) {
+        SCOPED_TRACE(joined(words));
+        const auto with_out = [&](const std::string& name) {
+            Words all = words;
+            all.insert(all.begin() + 2, at(name));
+            all.push_back("--quiet");
+            return all;
+        };
+        good(with_out("one" + ending));
+        const std::string expected = bytes("one" + ending);
+        for (const int n : processes)
+            for (const int threads : {1, 2}) {
+                const Ended r = mpi(n, with_out("many" + ending), threads);
+                EXPECT_EQ(r.code, 0) << r.err;
+                EXPECT_TRUE(bytes("many" + ending) == expected)
+                    << n << " processes, " << threads << " threads";
+                EXPECT_FALSE(fs::exists(folder_ / ("many" + ending + ".parts")));
+            }
+    }
+};
+
+}  // namespace
+
+TEST_F(Mpi, DenoisesToTheSameBytes) {
+    const std::string map = noisy();
+    expect_same({"denoise", map, "--order", "0", "--sigma", "local", "--steps", "24"}, ".mrc", {1, 2, 4, 5});
+    expect_same({"denoise", map, "--order", "1", "--threshold", "1sigma", "--steps", "9"}, ".vdb", {2, 5});
+    expect_same({"denoise", map, "--order", "2", "--sigma", "local:3", "--steps", "4", "--mode", "1",
+                 "--scale", "auto"},
+                ".rec", {3});
+}
+
+TEST_F(Mpi, TheTimeIsFoundTogether) {
+    const std::string map = noisy();
+    expect_same({"denoise", map, "--order", "1"}, ".mrc", {2});
+    const Ended one = mpi(2, {"denoise", map, at("b.mrc"), "--json"});
+    const Json told = Json::parse(one.out, nullptr, false);
+    ASSERT_TRUE(told.is_object()) << one.out;
+    const Json alone = json({"denoise", map, at("c.mrc")});
+    for (const char* key : {"time", "steps", "noise", "removed", "mean_after", "min", "max", "mean", "rms"})
+        EXPECT_EQ(told[key], alone[key]) << key;
+    EXPECT_EQ(told["members"], 2);
+}
+
+TEST_F(Mpi, LeavesPartsThatMerge) {
+    const std::string map = noisy();
+    const Words how{"--order", "1", "--steps", "6", "--threshold", "0.2", "--quiet"};
+    Words alone{"denoise", map, at("one.vdb")}, parts{"denoise", map, at("many.parts")};
+    alone.insert(alone.end(), how.begin(), how.end());
+    parts.insert(parts.end(), how.begin(), how.end());
+    good(alone);
+    const Ended r = mpi(4, parts);
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_EQ(std::distance(fs::directory_iterator(at("many.parts")), fs::directory_iterator()), 4);
+    good({"merge", at("many.parts"), at("many.vdb"), "--quiet"});
+    EXPECT_TRUE(bytes("many.vdb") == bytes("one.vdb"));
+    good({"merge", at("many.parts"), at("many.mrc"), "--quiet"});
+    good({"convert", at("one.vdb"), at("one.mrc"), "--quiet"});
+    EXPECT_TRUE(bytes("many.mrc") == bytes("one.mrc"));
+    // A part that is missing leaves background; one that is there twice is refused.
+    fs::copy(at("many.parts") + "/part_0000.vdb", at("many.parts") + "/part_0007.vdb");
+    expect_error(vdbgeo({"merge", at("many.parts"), at("bad.mrc"), "--quiet"}), 3, at("many.parts"),
+                 "overlaps");
+    expect_error(vdbgeo({"merge", folder_.path().string(), at("bad.mrc"), "--quiet"}), 3,
+                 folder_.path().string() + ": no folder of parts");
+    EXPECT_FALSE(fs::exists(at("bad.mrc")));
+}
+
+TEST_F(Mpi, ExtractsTheSameSurface) {
+    const std::string map = noisy();
+    expect_same({"surface", map, "--iso", "1.5sigma"}, ".ply", {1, 2, 4, 5});
+    good({"convert", map, at("a.vdb"), "--threshold", "0.5", "--quiet"});
+    expect_same({"surface", at("a.vdb"), "--iso", "0.7"}, ".ply", {3});
+    const Ended r = mpi(2, {"surface", map, at("b.ply"), "--iso", "1", "--json"});
+    const Json told = Json::parse(r.out, nullptr, false),
+               alone = json({"surface", map, at("c.ply"), "--iso", "1"});
+    for (const char* key : {"vertices", "faces", "iso", "method"}) EXPECT_EQ(told[key], alone[key]) << key;
+    EXPECT_FALSE(fs::exists(at("b.ply.unfinished")));
+}
+
+TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {
+    const std::string map = phantom("a.mrc", 40);
+    const auto expect = [&](int processes, const Words& words, int code, const std::string& text) {
+        SCOPED_TRACE(joined(words));
+        const Ended r = mpi(processes, words);
+        EXPECT_EQ(r.code, code) << r.err;
+        const std::size_t found = r.err.find("vdbgeo-mpi: error: ");
+        ASSERT_NE(found, std::string::npos) << r.err;
+        EXPECT_EQ(r.err.find("vdbgeo-mpi: error: ", found + 1), std::string::npos) << r.err;
+        EXPECT_NE(r.err.find(text), std::string::npos) << r.err;
+    };
+    expect(2, {"denoise", at("none.mrc"), at("b.mrc")}, 4, "none.mrc: cannot be opened");
+    expect(2, {"denoise", map, at("b.mrc"), "--order", "99"}, 2, "order 99");
+    expect(2, {"denoise", map, at("b.mrc"), "--method", "median"}, 2, "a team runs hyperdiffusion");
+    expect(2, {"denoise", map, at("none/b.mrc")}, 4, "there is no folder");
+    expect(7, {"denoise", map, at("b.mrc")}, 3, "cannot be shared out to 7");
+    expect(2, {"denoise", map, at("b.mrc"), "--threshold", "1e9"}, 5, "no sample is kept");
+    expect(2, {"surface", map, at("b.ply"), "--iso", "1e9"}, 5, "no surface at the isovalue");
+    expect(2, {"surface", map, at("b.ply"), "--iso", "otsu"}, 2, "a team takes a density");
+    expect(2, {"surface", map, at("b.stl"), "--iso", "0"}, 2, "a team writes .ply");
+    EXPECT_EQ(listing(), std::set<std::string>{"a.mrc"});
+}
+
+#endif

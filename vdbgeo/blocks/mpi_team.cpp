@@ -1,0 +1,177 @@
+#include "vdbgeo/blocks/mpi_team.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <chrono>
+#include <climits>
+#include <cstdlib>
+#include <list>
+#include <thread>
+
+#include "vdbgeo/core/errors.h"
+
+namespace vdbgeo {
+namespace {
+
+/// MPI counts in int: what is longer goes in pieces.
+constexpr std::size_t piece = std::size_t(1) << 30;
+
+int count_of(std::size_t n) {
+    if (n > INT_MAX) throw InvalidInput("a message of more than 2^31 numbers: use more, smaller parts");
+    return static_cast<int>(n);
+}
+
+class Message : public Team::Incoming {
+ public:
+    Message(int from, int tag, std::size_t count) : data_(count) {
+        MPI_Irecv(data_.data(), count_of(count), MPI_FLOAT, from, tag, MPI_COMM_WORLD, &request_);
+    }
+    ~Message() override {
+        if (request_ == MPI_REQUEST_NULL) return;
+        MPI_Cancel(&request_);
+        MPI_Request_free(&request_);
+    }
+    std::vector<float> take() override {
+        MPI_Wait(&request_, MPI_STATUS_IGNORE);
+        return std::move(data_);
+    }
+
+ private:
+    std::vector<float> data_;
+    MPI_Request request_ = MPI_REQUEST_NULL;
+};
+
+}  // namespace
+
+class MpiRun::Members : public Team {
+ public:
+    Members() {
+        MPI_Comm_size(MPI_COMM_WORLD, &size_);
+        MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
+        MPI_Comm_dup(MPI_COMM_WORLD, &failing);
+        MPI_Comm_dup(MPI_COMM_WORLD, &untagged);
+    }
+    ~Members() override {
+        if (gave_up) return;
+        for (Sent& s : sent_) MPI_Wait(&s.request, MPI_STATUS_IGNORE);
+        MPI_Comm_free(&failing);
+        MPI_Comm_free(&untagged);
+    }
+
+    MPI_Comm failing = MPI_COMM_NULL;   ///< where those meet that give up, whatever goes on elsewhere
+    MPI_Comm untagged = MPI_COMM_NULL;  ///< for the messages of exchange
+    bool gave_up = false;
+
+    int size() const override { return size_; }
+    int rank() const override { return rank_; }
+
+    std::vector<std::vector<char>> gather(const std::vector<char>& mine) override {
+        const std::uint64_t own = mine.size();
+        std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size_));
+        MPI_Allgather(&own, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD);
+        std::vector<std::vector<char>> all(static_cast<std::size_t>(size_));
+        for (int r = 0; r < size_; ++r) {
+            std::vector<char>& part = all[static_cast<std::size_t>(r)];
+            part.resize(sizes[static_cast<std::size_t>(r)]);
+            if (r == rank_) std::copy(mine.begin(), mine.end(), part.begin());
+            for (std::size_t at = 0; at < part.size(); at += piece)
+                MPI_Bcast(part.data() + at, count_of(std::min(piece, part.size() - at)), MPI_BYTE, r,
+                          MPI_COMM_WORLD);
+        }
+        return all;
+    }
+
+    std::vector<std::vector<char>> exchange(const std::vector<std::vector<char>>& to) override {
+        const auto n = static_cast<std::size_t>(size_);
+        std::vector<std::uint64_t> give(n), take(n);
+        for (std::size_t r = 0; r < n; ++r) give[r] = to[r].size();
+        MPI_Alltoall(give.data(), 1, MPI_UINT64_T, take.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD);
+        std::vector<std::vector<char>> from(n);
+        std::vector<MPI_Request> requests;
+        const auto for_pieces = [&](std::uint64_t bytes, const auto& body) {
+            for (std::uint64_t at = 0; at < bytes; at += piece) {
+                requests.push_back(MPI_REQUEST_NULL);
+                body(at, count_of(std::min<std::uint64_t>(piece, bytes - at)), &requests.back());
+            }
+        };
+        for (std::size_t r = 0; r < n; ++r) {
+            from[r].resize(take[r]);
+            for_pieces(take[r], [&](std::uint64_t at, int count, MPI_Request* request) {
+                MPI_Irecv(from[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0, untagged, request);
+            });
+        }
+        for (std::size_t r = 0; r < n; ++r)
+            for_pieces(give[r], [&](std::uint64_t at, int count, MPI_Request* request) {
+                MPI_Isend(to[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0, untagged, request);
+            });
+        MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+        return from;
+    }
+
+    void add_up(std::vector<std::uint64_t>& numbers) override {
+        MPI_Allreduce(MPI_IN_PLACE, numbers.data(), count_of(numbers.size()), MPI_UINT64_T, MPI_SUM,
+                      MPI_COMM_WORLD);
+    }
+
+    void send(int to, int tag, std::vector<float> data) override {
+        sent_.push_back({std::move(data), MPI_REQUEST_NULL});
+        Sent& s = sent_.back();
+        MPI_Isend(s.data.data(), count_of(s.data.size()), MPI_FLOAT, to, tag, MPI_COMM_WORLD, &s.request);
+    }
+
+    std::unique_ptr<Incoming> expect(int from, int tag, std::size_t count) override {
+        return std::make_unique<Message>(from, tag, count);
+    }
+
+    void move_messages() override {
+        for (auto s = sent_.begin(); s != sent_.end();) {
+            int done = 0;
+            MPI_Test(&s->request, &done, MPI_STATUS_IGNORE);
+            s = done ? sent_.erase(s) : std::next(s);
+        }
+    }
+
+ private:
+    struct Sent {
+        std::vector<float> data;
+        MPI_Request request;
+    };
+    int size_ = 1, rank_ = 0;
+    std::list<Sent> sent_;
+};
+
+MpiRun::MpiRun(int& argc, char**& argv) {
+    int provided = 0;
+    MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
+    members_ = std::make_unique<Members>();
+}
+
+MpiRun::~MpiRun() {
+    members_.reset();
+    MPI_Finalize();
+}
+
+Team& MpiRun::team() { return *members_; }
+
+void MpiRun::fail(int code, const std::function<void()>& say) {
+    using Clock = std::chrono::steady_clock;
+    constexpr auto patience = std::chrono::seconds(2);
+    MPI_Request all_are_here = MPI_REQUEST_NULL;
+    members_->gave_up = true;
+    MPI_Ibarrier(members_->failing, &all_are_here);
+    int done = 0;
+    for (const auto begin = Clock::now(); !done && Clock::now() - begin < patience;) {
+        MPI_Test(&all_are_here, &done, MPI_STATUS_IGNORE);
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    if (done) {
+        if (members_->rank() == 0) say();
+        return;
+    }
+    say();
+    MPI_Abort(MPI_COMM_WORLD, code);
+    std::abort();
+}
+
+}  // namespace vdbgeo

@@ -1,0 +1,109 @@
+#include "vdbgeo/stencil/ghost_exchange.h"
+
+#include <algorithm>
+
+#include "vdbgeo/stencil/block_field.h"
+
+namespace vdbgeo::stencil {
+namespace {
+
+constexpr std::size_t brick_size = BlockField::brick_size;
+constexpr int tags = 16384;  // MPI promises 32767
+
+}  // namespace
+
+GhostExchange::GhostExchange(const BlockLayout& layout, const Share& share) : team_(*share.team) {
+    std::vector<openvdb::CoordBBox> reach;
+    for (int r = 0; r < team_.size(); ++r) reach.push_back(share.with_ghosts(r));
+    const auto owner = [&](const openvdb::Coord& leaf) {
+        int r = 0;
+        while (!share.boxes[static_cast<std::size_t>(r)].isInside(leaf)) ++r;
+        return r;
+    };
+    for (const BlockLayout::Slab& s : layout.slabs()) {
+        Slab slab;
+        const int y = layout.cells()[s.first_cell].origin.y() / BlockLayout::size_y;
+        slab.tag = (y % tags + tags) % tags;
+        for (std::size_t b = s.begin; b < s.end; ++b) {
+            const openvdb::Coord& at = layout.origin(b);
+            if (!share.own().isInside(at)) {
+                add(slab.in, owner(at), b);
+                continue;
+            }
+            const openvdb::CoordBBox leaf(at, at.offsetBy(7));
+            for (int r = 0; r < team_.size(); ++r)
+                if (r != team_.rank() && reach[static_cast<std::size_t>(r)].hasOverlap(leaf))
+                    add(slab.out, r, b);
+        }
+        slabs_.push_back(std::move(slab));
+    }
+}
+
+/// The layout's order of bricks is that of their places, so both sides list them alike.
+void GhostExchange::add(std::vector<Piece>& pieces, int member, std::size_t brick) {
+    auto piece =
+        std::find_if(pieces.begin(), pieces.end(), [&](const Piece& p) { return p.member == member; });
+    if (piece == pieces.end()) piece = pieces.insert(piece, {member, {}});
+    piece->bricks.push_back(static_cast<std::int32_t>(brick));
+}
+
+void GhostExchange::expect(Slab& slab) {
+    slab.round = round_;
+    for (const Piece& piece : slab.in)
+        slab.coming.push_back(
+            team_.expect(piece.member, slab.tag, fields_ * piece.bricks.size() * brick_size));
+}
+
+void GhostExchange::begin(std::size_t fields) {
+    ++round_;
+    fields_ = fields;
+    for (Slab& slab : slabs_)
+        if (slab.coming.empty()) expect(slab);
+}
+
+void GhostExchange::send(std::size_t slab, const std::vector<const float*>& fields) {
+    for (const Piece& piece : slabs_[slab].out) {
+        std::vector<float> data;
+        data.reserve(fields.size() * piece.bricks.size() * brick_size);
+        for (const float* field : fields)
+            for (const std::int32_t b : piece.bricks) {
+                const float* brick = field + static_cast<std::size_t>(b) * brick_size;
+                data.insert(data.end(), brick, brick + brick_size);
+            }
+        bytes_sent_ += data.size() * sizeof(float);
+        team_.send(piece.member, slabs_[slab].tag, std::move(data));
+    }
+    team_.move_messages();
+}
+
+void GhostExchange::fill(Slab& slab, int round, const std::vector<float*>& fields) {
+    if (slab.coming.empty() || slab.round > round) return;
+    for (std::size_t i = 0; i < slab.in.size(); ++i) {
+        const std::vector<float> data = slab.coming[i]->take();
+        const float* from = data.data();
+        for (float* field : fields)
+            for (const std::int32_t b : slab.in[i].bricks) {
+                std::copy_n(from, brick_size, field + static_cast<std::size_t>(b) * brick_size);
+                from += brick_size;
+            }
+    }
+    slab.coming.clear();
+    if (slab.round < round_) expect(slab);
+}
+
+void GhostExchange::fill_around(std::size_t slab, const std::vector<float*>& fields) {
+    for (std::size_t s = slab > 0 ? slab - 1 : 0; s < std::min(slab + 2, slabs_.size()); ++s)
+        fill(slabs_[s], round_ - 1, fields);
+}
+
+void GhostExchange::fill_all(const std::vector<float*>& fields) {
+    for (Slab& slab : slabs_) fill(slab, round_, fields);
+}
+
+void GhostExchange::run(const std::vector<float*>& fields) {
+    begin(fields.size());
+    for (std::size_t s = 0; s < slabs_.size(); ++s) send(s, {fields.begin(), fields.end()});
+    fill_all(fields);
+}
+
+}  // namespace vdbgeo::stencil

@@ -21,7 +21,7 @@ namespace vdbgeo::app {
 namespace {
 
 struct DenoiseOptions;
-void check_for_team(const DenoiseOptions& o);
+void check_for_team(const DenoiseOptions& o, Session& session);
 
 struct DenoiseOptions {
     MapFilterFlags files;
@@ -56,7 +56,7 @@ void DenoiseOptions::check_flags() const {
 void DenoiseOptions::finish(Session& session) {
     files.finish();
     check_flags();
-    if (!(session.team && has_ending(files.out, ".parts"))) check_map_output(files.out, session);
+    if (!session.team) check_map_output(files.out, session);
     check_plot_output(spectra);
     plots.check(!spectra.empty(), "--spectra");
     check_folder_of(slices);
@@ -68,7 +68,7 @@ void DenoiseOptions::finish(Session& session) {
         diffusion.orders = "0";
     }
     diffusion.finish();
-    if (session.team) check_for_team(*this);
+    if (session.team) check_for_team(*this, session);
 }
 
 /// What was chosen and done, for the result and in words; what is empty or null does not apply.
@@ -163,48 +163,20 @@ void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Sessi
     session.say(fmt::format("voxels      {}", j["active_voxels"].get<std::uint64_t>()));
 }
 
-void check_for_team(const DenoiseOptions& o) {
-    check_team_output(o.files);
-    check_folder_of(o.files.out);
+void check_for_team(const DenoiseOptions& o, Session& session) {
+    check_team_output(o.files, session);
     if (!o.diffuses()) throw UsageError(fmt::format("--method {}: a team runs hyperdiffusion", o.method));
     for (const auto& [flag, value] : {std::pair("--spectra", o.spectra), {"--slices", o.slices}})
         if (!value.empty()) throw UsageError(fmt::format("{}: a team draws no pictures", flag));
 }
 
-/// Every member denoises its part.
-void run_denoise_by_team(const DenoiseOptions& o, Session& session) {
-    Json seconds;
-    Clock clock;
-    MapOfTeam map = read_for_team(o.files, hyperdiffusion_halo(o.diffusion.options), session);
-    need_density(o.files.in, map.in);
-    seconds["read"] = clock.lap();
-    const MapShare all{session.team, map.share.own()};
-    const double rms_before = active_moments(*map.in.map.grid, all).statistics().rms;
-    const Outcome outcome = diffuse(o, *map.in.map.grid, session.stage("denoising"), &map.share);
-    finish_map(map.in.map, fmt::format("denoised: {}, {}", o.method, outcome.history), map.share);
-    seconds["compute"] = clock.lap();
-    Json j = filter_result(o.files, map.in);
-    j["method"] = o.method;
-    j.update(outcome.numbers);
-    j["removed"] = outcome.removed;
-    j.update(statistics_json(map.in.map.statistics));
-    std::vector<std::uint64_t> sent{outcome.bytes_sent};
-    session.team->add_up(sent);
-    j["members"] = session.team->size();
-    j["bytes_sent"] = sent[0];
-    write_by_team(o.files, map.in.map, map.share, j, session);
-    seconds["write"] = clock.lap();
-    j["seconds"] = seconds;
-    say_outcome(outcome, j, rms_before, session);
-    session.result(j);
-}
-
 void run_denoise(const DenoiseOptions& o, Session& session) {
-    if (session.team) return run_denoise_by_team(o, session);
     Json seconds;
     Clock clock;
     const double state = o.diffuses() ? 20.2 : 16.4;  // bytes a voxel: grid and fields
-    MapFile in = read_for_filter(o.files, {"denoising", state}, session);
+    FilterInput input =
+        read_filter_input(o.files, {"denoising", state}, hyperdiffusion_halo(o.diffusion.options), session);
+    MapFile& in = input.in;
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
     Preview preview;
@@ -212,12 +184,13 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     const bool shown = !o.files.preview.empty() || !o.spectra.empty();
     if (!o.slices.empty()) slices.take_before(in.map);
     if (shown) preview.add("before", in.map, Preview::Greys::own, session.stage("preview"));
-    const double rms_before = active_moments(*in.map.grid).statistics().rms;
+    const double rms_before = active_moments(*in.map.grid, input.counted()).statistics().rms;
     seconds["preview"] = clock.lap();
     openvdb::FloatGrid& grid = *in.map.grid;
     const Progress progress = session.stage("denoising");
-    const Outcome outcome = o.diffuses() ? diffuse(o, grid, progress) : filter(o, grid, progress);
-    finish_map(in.map, fmt::format("denoised: {}, {}", o.method, outcome.history));
+    const Outcome outcome =
+        o.diffuses() ? diffuse(o, grid, progress, input.share()) : filter(o, grid, progress);
+    finish_map(input, fmt::format("denoised: {}, {}", o.method, outcome.history));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, in);
     j["method"] = o.method;
@@ -227,7 +200,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     if (shown) preview.add("after", in.map, Preview::Greys::as_first, session.stage("preview"));
     if (!o.slices.empty()) slices.take_after(in.map);
     seconds["preview"] = seconds["preview"].get<double>() + clock.lap();
-    write_filtered(o.files, in.map, j, session);
+    write_filtered(o.files, input, outcome.bytes_sent, j, session);
     seconds["write"] = clock.lap();
     if (shown) {
         if (!o.files.preview.empty()) {

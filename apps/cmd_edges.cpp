@@ -7,6 +7,7 @@
 #include "apps/preview.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/team_filter.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -20,7 +21,8 @@ void run_edges(const EdgesOptions& o, Session& session) {
     const HighPassOptions& options = o.high_pass.options;
     Json seconds;
     Clock clock;
-    MapFile in = read_for_filter(o.files, {"finding edges", 32.2}, session);
+    FilterInput input = read_filter_input(o.files, {"finding edges", 32.2}, high_pass_halo(options), session);
+    MapFile& in = input.in;
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
     Preview preview;
@@ -29,9 +31,9 @@ void run_edges(const EdgesOptions& o, Session& session) {
     clock.lap();
     const Progress progress = session.stage("edges");
     const HyperdiffusionReport r =
-        naming(o.files.in, [&] { return coupled_high_pass(*in.map.grid, options, progress); });
+        naming(o.files.in, [&] { return coupled_high_pass(*in.map.grid, options, progress, input.share()); });
     clear_inactive(*in.map.grid);
-    finish_map(in.map,
+    finish_map(input,
                fmt::format("edges: order {}, diffusivities {} and {}, coupling {} and {}, sigma {}, time "
                            "{:.9g}, {} steps, dt {:.9g}, {}",
                            options.order, options.slow, options.fast, options.coupling_u, options.coupling_v,
@@ -49,7 +51,7 @@ void run_edges(const EdgesOptions& o, Session& session) {
     j.update(statistics_json(in.map.statistics));
     if (shown) preview.add("edges", in.map, Preview::Greys::own, session.stage("preview"));
     clock.lap();
-    write_filtered(o.files, in.map, j, session);
+    write_filtered(o.files, input, r.bytes_sent, j, session);
     seconds["write"] = clock.lap();
     if (shown) {
         preview.write(o.files.preview);
@@ -82,7 +84,10 @@ Command edges_command() {
             return [o](Session& session) {
                 o->files.finish();
                 o->high_pass.finish();
-                check_map_output(o->files.out, session);
+                if (session.team)
+                    check_team_output(o->files, session);
+                else
+                    check_map_output(o->files.out, session);
                 run_edges(*o, session);
             };
         }};

@@ -87,21 +87,24 @@ MapFile read_for_filter(const MapFilterFlags& flags, const MemoryNeed& need, Ses
     const char* fewer = "--bin 2, --crop or --threshold";
     if (const auto samples = samples_to_come(flags)) check_memory(flags, need, *samples, fewer);
     MapFile in = read_map(flags.in, flags.map.options, session.stage("reading"));
-    const Moments kept = active_moments(*in.map.grid);
-    if (kept.non_finite > 0)
-        throw InvalidInput(fmt::format(
-            "{}: {} of the samples are not finite numbers; --threshold or --mask can leave them out",
-            flags.in, kept.non_finite));
-    if (kept.count == 0)
-        throw NumericalError(fmt::format(
-            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
-            flags.in, in.map.statistics.min, in.map.statistics.max));
+    need_samples(flags.in, active_moments(*in.map.grid), in.map.statistics);
     check_memory(flags, need, voxels_in_leaves(*in.map.grid),
                  flags.in != "-" && is_vdb_file(flags.in) ? "a grid with fewer active voxels" : fewer);
     for (const std::string& w : in.warnings) session.warn(flags.in + ": " + w);
     if (!session.json && !session.quiet)
         for (const std::string& note : in.notes) session.say(flags.in + ": " + note);
     return in;
+}
+
+void need_samples(const std::string& name, const Moments& kept, const Statistics& of_map) {
+    if (kept.non_finite > 0)
+        throw InvalidInput(fmt::format(
+            "{}: {} of the samples are not finite numbers; --threshold or --mask can leave them out", name,
+            kept.non_finite));
+    if (kept.count == 0)
+        throw NumericalError(fmt::format(
+            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold", name,
+            of_map.min, of_map.max));
 }
 
 void need_density(const std::string& name, const MapFile& in) {

@@ -10,6 +10,7 @@
 #include "converters/map_file.h"
 #include "converters/mrc.h"
 #include "converters/vdb_file.h"
+#include "vdbgeo/volume/sparsify.h"
 
 namespace vdbgeo::app {
 
@@ -37,6 +38,9 @@ struct MemoryNeed {
 /// --memory. Throws what read_map does; NumericalError where no sample is kept or the memory does not
 /// suffice; InvalidInput where a sample that is kept is not a finite number.
 MapFile read_for_filter(const MapFilterFlags& flags, const MemoryNeed& need, Session& session);
+
+/// InvalidInput where a sample that is kept is not a finite number; NumericalError where none is kept.
+void need_samples(const std::string& name, const Moments& kept, const Statistics& of_map);
 
 /// InvalidInput for a level set, which is no density.
 void need_density(const std::string& name, const MapFile& in);

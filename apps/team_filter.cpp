@@ -42,34 +42,32 @@ MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, in
     return map;
 }
 
-MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session) {
+FilterInput read_filter_input(const MapFilterFlags& flags, const MemoryNeed& need, int halo,
+                              Session& session) {
+    if (!session.team) return {read_for_filter(flags, need, session), {}};
     MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
-    const Moments kept = active_moments(*map.in.map.grid, {session.team, map.share.own()});
-    if (kept.non_finite > 0)
-        throw InvalidInput(fmt::format(
-            "{}: {} of the samples are not finite numbers; --threshold or --mask can leave them out",
-            flags.in, kept.non_finite));
-    if (kept.count == 0)
-        throw NumericalError(fmt::format(
-            "{}: no sample is kept: the values lie between {:.6g} and {:.6g}; try another --threshold",
-            flags.in, map.in.map.statistics.min, map.in.map.statistics.max));
-    return map;
+    FilterInput input{std::move(map.in), std::move(map.share)};
+    need_samples(flags.in, active_moments(*input.in.map.grid, input.counted()), input.in.map.statistics);
+    return input;
 }
 
-void finish_map(DensityMap& map, const std::string& history, const stencil::Share& share) {
-    map.statistics = statistics_of(map, {share.team, share.own()});
-    note_new_values(map, history);
+void finish_map(FilterInput& input, const std::string& history) {
+    input.in.map.statistics = statistics_of(input.in.map, input.counted());
+    note_new_values(input.in.map, history);
 }
 
-void check_team_output(const MapFilterFlags& flags) {
+void check_team_output(const MapFilterFlags& flags, Session& session) {
     if (flags.out == "-") throw UsageError("-: members of a team write files, not to standard output");
     if (has_ending(flags.out, ".nvdb"))
         throw UsageError(fmt::format("{}: a team writes .vdb, map files or a folder .parts", flags.out));
     if (!flags.preview.empty()) throw UsageError("--preview: a team draws no pictures");
+    if (!has_ending(flags.out, ".parts")) check_map_output(flags.out, session);
+    check_folder_of(flags.out);
 }
 
-void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const stencil::Share& share,
-                   Json& result, Session& session) {
+/// Every member writes its part into a folder beside the output, and then one of them makes them one file.
+static void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const stencil::Share& share,
+                          Json& result, Session& session) {
     Team& team = *share.team;
     const fs::path folder = folder_of_parts(flags.out);
     const Progress progress = session.stage("writing");
@@ -92,6 +90,16 @@ void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const ste
     }
     wait_for_all(team);
     session.end_stage();
+}
+
+void write_filtered(const MapFilterFlags& flags, const FilterInput& input, std::uint64_t bytes_sent,
+                    Json& result, Session& session) {
+    if (!input.part) return write_filtered(flags, input.in.map, result, session);
+    std::vector<std::uint64_t> sent{bytes_sent};
+    session.team->add_up(sent);
+    result["members"] = session.team->size();
+    result["bytes_sent"] = sent[0];
+    write_by_team(flags, input.in.map, *input.part, result, session);
 }
 
 std::optional<MrcWriteReport> merge_parts(const fs::path& folder, const std::string& out,

@@ -7,6 +7,7 @@
 
 #include "apps/map_filter.h"
 #include "vdbgeo/stencil/share.h"
+#include "vdbgeo/volume/map_statistics.h"
 
 namespace vdbgeo::app {
 
@@ -19,22 +20,34 @@ struct MapOfTeam {
 /// Shares out the map among the session's team and reads this member's part, with ghosts `halo` voxels wide.
 /// Says what is odd about it.
 MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session);
-/// The same with the checks of read_for_filter.
-MapOfTeam read_for_team(const MapFilterFlags& flags, int halo, Session& session);
-
 /// Returns once all members have come here.
 void wait_for_all(Team& team);
 
-/// Makes the statistics, the metadata and the history those of the new values of all parts.
-void finish_map(DensityMap& map, const std::string& history, const stencil::Share& share);
+/// A map that is to become another: whole, or a member's part where a team runs the command.
+struct FilterInput {
+    MapFile in;
+    std::optional<stencil::Share> part;
 
-/// UsageError where a team cannot write such a file.
-void check_team_output(const MapFilterFlags& flags);
+    const stencil::Share* share() const { return part ? &*part : nullptr; }
+    /// Which leaves count, for statistics.
+    MapShare counted() const { return part ? MapShare{part->team, part->own()} : MapShare{}; }
+};
 
-/// Every member writes its part into a folder beside the output, and then one of them makes them one file. A
-/// name that ends in .parts is such a folder, and stays one.
-void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const stencil::Share& share,
-                   Json& result, Session& session);
+/// read_for_filter, or this member's part with ghosts `halo` voxels wide and the same checks but that of the
+/// memory.
+FilterInput read_filter_input(const MapFilterFlags& flags, const MemoryNeed& need, int halo,
+                              Session& session);
+
+/// Makes the statistics, the metadata and the history of the map those of its new values, of all parts.
+void finish_map(FilterInput& input, const std::string& history);
+
+/// write_filtered, or by all members. Adds how many there are, and what they sent each other, to the result.
+void write_filtered(const MapFilterFlags& flags, const FilterInput& input, std::uint64_t bytes_sent,
+                    Json& result, Session& session);
+
+/// UsageError, or IoError for its folder, where a team cannot write such a file. A name that ends in .parts
+/// is a folder of parts, which stay apart.
+void check_team_output(const MapFilterFlags& flags, Session& session);
 
 /// Makes one file of a folder of parts, by its name's ending. What there is to say of an MRC file comes back.
 std::optional<MrcWriteReport> merge_parts(const std::filesystem::path& folder, const std::string& out,

@@ -62,6 +62,10 @@ TEST_F(Mpi, DenoisesToTheSameBytes) {
                 ".rec", {3});
 }
 
+TEST_F(Mpi, FindsTheSameEdges) {
+    expect_same({"edges", noisy(), "--order", "1", "--time", "0.2", "--threshold", "0.1"}, ".mrc", {2, 5});
+}
+
 TEST_F(Mpi, TheTimeIsFoundTogether) {
     const std::string map = noisy();
     expect_same({"denoise", map, "--order", "1"}, ".mrc", {2});

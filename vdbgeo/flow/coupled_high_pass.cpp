@@ -26,16 +26,22 @@ void HighPassOptions::check() const {
     require(!cycle || (*cycle >= 1 && *cycle <= 300), "a cycle has 1 to 300 steps");
 }
 
+int high_pass_halo(const HighPassOptions& options) {
+    return diffusion_halo({{options.order, options.slow}}, options.sigma);
+}
+
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options,
-                                       const Progress& progress) {
+                                       const Progress& progress, const stencil::Share* share) {
     options.check();
+    check_halo(share, high_pass_halo(options));
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
-    if (grid.activeVoxelCount() == 0) return report;
+    if (!share && grid.activeVoxelCount() == 0) return report;
     DiffusionSolver solver(grid,
                            {{{{options.order, options.slow}}, options.coupling_u},
                             {{{options.order, options.fast}}, options.coupling_v}},
-                           options.sigma);
+                           options.sigma, share);
+    if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
     solver.run(options.stepper,
                cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),

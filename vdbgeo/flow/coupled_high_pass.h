@@ -24,7 +24,11 @@ struct HighPassOptions {
 /// edges w = u − v. F1 and F2 are hyperdiffusion operators with d_10 and d_20. Bound of the step:
 /// 2 / (d_20 λ^{q+1} + ε_u + ε_v). Neutral: d_10 = d_20 gives 0 everywhere, and so does a constant.
 /// Errors as hyperdiffuse. Memory: 24 to 28 bytes a voxel of active leaves.
+/// `share`: as for hyperdiffuse, with the halo that high_pass_halo tells.
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options = {},
-                                       const Progress& progress = {});
+                                       const Progress& progress = {}, const stencil::Share* share = nullptr);
+
+/// Voxels that a part needs around its own.
+int high_pass_halo(const HighPassOptions& options);
 
 }  // namespace vdbgeo

@@ -81,6 +81,12 @@ int diffusion_halo(const std::vector<DiffusionTerm>& terms, const EdgeScale& sig
     return (halo + 7) / 8 * 8;
 }
 
+void check_halo(const stencil::Share* share, int needed) {
+    if (share && share->halo < needed)
+        throw InvalidInput(
+            fmt::format("a halo of {} voxels is needed, and there is one of {}", needed, share->halo));
+}
+
 DiffusionSolver::DiffusionSolver(const openvdb::FloatGrid& grid, std::vector<Field> fields,
                                  const EdgeScale& sigma, const stencil::Share* share)
     : grid_(grid),

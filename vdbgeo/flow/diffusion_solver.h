@@ -37,6 +37,8 @@ int growing_cycle(int order, int k);
 std::vector<CycleRun> cycles_for_time(Stepper stepper, double time, double largest, const CycleRule& rule);
 /// How far around its own cells, in voxels and whole leaves, a member of a team has to have a grid.
 int diffusion_halo(const std::vector<DiffusionTerm>& terms, const EdgeScale& sigma);
+/// InvalidInput for a share with a narrower halo.
+void check_halo(const stencil::Share* share, int needed);
 
 /// One or two fields u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u). With one field the target is X; with
 /// two, each is drawn to the other.

@@ -208,9 +208,7 @@ int hyperdiffusion_halo(const HyperdiffusionOptions& options) {
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options,
                                   const Progress& progress, const stencil::Share* share) {
     options.check();
-    if (share && share->halo < hyperdiffusion_halo(options))
-        throw InvalidInput(fmt::format("a halo of {} voxels is needed, and there is one of {}",
-                                       hyperdiffusion_halo(options), share->halo));
+    check_halo(share, hyperdiffusion_halo(options));
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
     if (!share && grid.activeVoxelCount() == 0) return report;

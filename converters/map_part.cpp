@@ -5,6 +5,7 @@
 
 #include "converters/map_passes.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {
@@ -109,13 +110,7 @@ MapFile read_mrc_part(const std::filesystem::path& path, const MapReadOptions& o
 
 MapFile part_of_vdb(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part) {
     MapFile whole = read_map(path, options);
-    openvdb::FloatTree& tree = whole.map.grid->tree();
-    if (tree.hasActiveTiles()) tree.voxelizeActiveTiles();
-    const auto kept = whole.map.grid->copyWithNewTree();
-    kept->setTransform(whole.map.grid->transformPtr());  // a copy of it rounds its scale
-    for (auto it = tree.beginLeaf(); it; ++it)
-        if (part.wanted.hasOverlap(it->getNodeBoundingBox())) kept->tree().addLeaf(new leaf::Leaf(*it));
-    whole.map.grid = kept;
+    whole.map.grid = part_of(*whole.map.grid, part.wanted);
     return whole;
 }
 

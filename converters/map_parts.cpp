@@ -71,6 +71,15 @@ void write_map_part(const DensityMap& map, const CoordBBox& own, int number, con
     write_vdb({part}, folder / fmt::format("part_{:04}.vdb", number), options, progress);
 }
 
+void remove_map_parts(const fs::path& folder) {
+    std::error_code error;
+    if (!fs::is_directory(folder, error)) return;
+    for (const fs::path& file : part_files(folder))
+        if (!fs::remove(file, error))
+            throw IoError(fmt::format("{}: cannot be removed: {}", file.string(), error.message()));
+    if (fs::is_empty(folder, error)) fs::remove(folder, error);
+}
+
 bool is_map_parts(const fs::path& path) {
     std::error_code error;
     if (!fs::is_directory(path, error)) return false;

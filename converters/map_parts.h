@@ -18,6 +18,10 @@ void write_map_part(const DensityMap& map, const openvdb::CoordBBox& own, int nu
                     const std::filesystem::path& folder, const VdbWriteOptions& options = {},
                     const Progress& progress = {});
 
+/// Takes the parts out of a folder, and nothing else; the folder too where nothing is left. One that is not
+/// there is left alone. IoError.
+void remove_map_parts(const std::filesystem::path& folder);
+
 /// Whether that is a folder of parts.
 bool is_map_parts(const std::filesystem::path& path);
 

@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/team.h"
 #include "vdbgeo/stencil/share.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 
@@ -24,9 +25,5 @@ std::pair<int, int> parts_for(const openvdb::CoordBBox& box, int members);
 /// The boxes of a partition without an outer border: those at an end along an axis go on to the end of the
 /// indices, so that every voxel lies in one box.
 std::vector<openvdb::CoordBBox> without_border(std::vector<openvdb::CoordBBox> boxes);
-
-/// Copies the leaves that touch `box`, with values, masks, background and transform. Active tiles become
-/// leaves; inactive ones that touch the box stay tiles.
-openvdb::FloatGrid::Ptr part_of(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box);
 
 }  // namespace vdbgeo

@@ -30,6 +30,18 @@ int high_pass_halo(const HighPassOptions& options) {
     return diffusion_halo({{options.order, options.slow}}, options.sigma);
 }
 
+std::vector<DiffusionProblem::Field> high_pass_fields(const HighPassOptions& options) {
+    return {{{{options.order, options.slow}}, options.coupling_u},
+            {{{options.order, options.fast}}, options.coupling_v}};
+}
+
+void take_high_pass_cycles(CycleSolver& solver, const HighPassOptions& options, double step,
+                           HyperdiffusionReport& report, const Progress& progress) {
+    solver.run(options.stepper,
+               cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),
+               report, progress);
+}
+
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options,
                                        const Progress& progress, const stencil::Share* share) {
     options.check();
@@ -37,15 +49,9 @@ HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassO
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
     if (!share && grid.activeVoxelCount() == 0) return report;
-    DiffusionSolver solver(grid,
-                           {{{{options.order, options.slow}}, options.coupling_u},
-                            {{{options.order, options.fast}}, options.coupling_v}},
-                           options.sigma, share);
+    DiffusionSolver solver(grid, high_pass_fields(options), options.sigma, share);
     if (solver.active_voxels() == 0) return report;
-    const double step = solver.step(options.stepper, options.dt);
-    solver.run(options.stepper,
-               cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),
-               report, progress);
+    take_high_pass_cycles(solver, options, solver.step(options.stepper, options.dt), report, progress);
     solver.describe(report);
     solver.store(grid);
     return report;

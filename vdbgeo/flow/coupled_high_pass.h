@@ -1,6 +1,10 @@
 // Edges as the difference of two coupled diffusions (Feng, Xia, Tong, Wei 2012, Eqs 6–8).
 #pragma once
 
+#include <vector>
+
+#include "vdbgeo/flow/cycles.h"
+#include "vdbgeo/flow/diffusion_fields.h"
 #include "vdbgeo/flow/hyperdiffusion.h"
 
 namespace vdbgeo {
@@ -30,5 +34,10 @@ HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassO
 
 /// Voxels that a part needs around its own.
 int high_pass_halo(const HighPassOptions& options);
+
+/// u and v, for a solver, and the cycles that it takes.
+std::vector<DiffusionProblem::Field> high_pass_fields(const HighPassOptions& options);
+void take_high_pass_cycles(CycleSolver& solver, const HighPassOptions& options, double step,
+                           HyperdiffusionReport& report, const Progress& progress);
 
 }  // namespace vdbgeo

@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/team.h"
 #include "vdbgeo/stencil/block_layout.h"
+#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo::stencil {
 
@@ -48,7 +49,18 @@ struct FieldSummary {
 /// where there is a team; the same bits however the cells are shared out.
 FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team = nullptr);
 
-/// Σ (a − b)² over the active voxels, likewise.
+/// The same of a field that comes in parts: CellTotal tells in which order.
+class FieldTotal {
+ public:
+    FieldTotal();
+    void add(const BlockLayout& layout, const float* bricks);
+    FieldSummary summary(Team* team = nullptr) const;
+
+ private:
+    CellTotal<FieldSummary> total_;
+};
+
+/// Σ (a − b)² over the active voxels, in the same order.
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team = nullptr);
 
 /// out = value − offset in the active voxels, 0 in the others. The tree has the layout's leaves.

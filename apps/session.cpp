@@ -14,7 +14,7 @@
 namespace vdbgeo::app {
 namespace {
 
-volatile sig_atomic_t interrupted = 0;
+volatile sig_atomic_t interrupted = 0, stop_wanted = 0;
 
 void on_interrupt(int) {
     if (interrupted) _exit(130);  // a second Ctrl-C does not wait
@@ -154,6 +154,14 @@ Session::~Session() { end_stage(); }
 
 std::string json_text(const Json& value, int indent) {
     return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+std::function<bool()> stop_handler() {
+    struct sigaction action {};
+    action.sa_handler = [](int) { stop_wanted = 1; };
+    sigaction(SIGTERM, &action, nullptr);
+    sigaction(SIGUSR1, &action, nullptr);
+    return [] { return stop_wanted != 0; };
 }
 
 void install_interrupt_handler() {

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/checkpoint.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/noise.h"
+#include "vdbgeo/flow/state_file.h"
 #include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/tiles.h"
@@ -138,6 +140,7 @@ void BlockedDiffusion::find_edges(const Progress& progress) {
         BlockField x(layout.brick_count());
         stencil::load(layout, grid->tree(), offset_, x.brick(0));
         for (std::size_t f = 0; f < problem_.fields.size(); ++f) totals.add(layout, f, x.brick(0));
+        input_hash_ += stencil::hash_of_bricks(layout, x.brick(0));
         progress.report(double(i + 1) / double(plan.blocks.size()));
     }
     before_ = totals.fields[0].summary();
@@ -237,6 +240,7 @@ void BlockedDiffusion::load(const Part& part, const BrickIndex::Part& bricks, co
         for (std::size_t f = 0; f < now_.size(); ++f) now_[f].now->read(bricks.runs, fields.now(f));
     }
     malloc_trim(0);  // what the grid took goes back before the fields take theirs
+    fields.clear_rest();
     if (part.begins()) return;
     const std::vector<float*> d = fields.coefficients();
     for (std::size_t i = 0; i < d.size(); ++i) coefficients_[i]->read(bricks.runs, d[i]);
@@ -287,12 +291,63 @@ double BlockedDiffusion::removed() {
     return std::sqrt(total.total() / std::max(1.0, static_cast<double>(active_voxels())));
 }
 
+/// For what goes through all fields, a block at a time.
+BlockPlan BlockedDiffusion::copying_plan(int ghosts) const {
+    BlockWork work;
+    work.last_reach = ghosts;
+    work.bytes_a_brick = static_cast<double>(problem_.fields.size()) * 2048 + 96;
+    return plan(work, &index_);
+}
+
+void BlockedDiffusion::save(StateWriter& writer) {
+    for (const CoordBBox& own : copying_plan(0).blocks) {
+        const BrickIndex::Part bricks = index_.part(own);
+        const BlockLayout layout(bricks.leaves, own);
+        std::vector<BlockField> fields;
+        std::vector<const float*> now;
+        for (const Generations& g : now_) {
+            fields.emplace_back(layout.brick_count());
+            g.now->read(bricks.runs, fields.back().brick(0));
+            now.push_back(fields.back().brick(0));
+        }
+        writer.add(layout, now);
+    }
+}
+
+void BlockedDiffusion::load(const StateReader& reader) {
+    const BlockPlan plan = copying_plan(1);
+    Totals totals(problem_);
+    now_.resize(problem_.fields.size());
+    for (Generations& g : now_)
+        if (!g.now) g.now = std::make_unique<BrickFile>(options_.scratch);
+    for (const CoordBBox& own : plan.blocks) {
+        CoordBBox box = own;
+        box.expand(plan.halo);
+        const BrickIndex::Part bricks = index_.part(box);
+        const BlockLayout layout(bricks.leaves, own);
+        std::vector<BlockField> fields;
+        std::vector<float*> now;
+        for (std::size_t f = 0; f < now_.size(); ++f) {
+            fields.emplace_back(layout.brick_count());
+            now.push_back(fields.back().brick(0));
+        }
+        reader.read(layout, now);
+        for (std::size_t f = 0; f < now_.size(); ++f) {
+            totals.add(layout, f, now[f]);
+            now_[f].now->write(BrickIndex::within(bricks, own), now[f]);
+        }
+    }
+    is_input_ = false;
+    keep(totals);
+}
+
 void BlockedDiffusion::describe(HyperdiffusionReport& report) {
     report.active_voxels = active_voxels();
     report.mean_before = before_.mean() + offset_;
     report.mean_after = summary_[0].mean() + offset_;
     report.state_bytes = most_memory_ + index_.memory();
     report.removed = removed();
+    report.blocks = most_blocks_;
 }
 
 void BlockedDiffusion::store(const CoordBBox& box, openvdb::FloatTree& part) const {
@@ -349,8 +404,11 @@ std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
     if (solver->active_voxels() == 0) return nullptr;
     report.automatic = !options.time && !options.steps;
     if (report.automatic) report.noise = noise_of(source, solver->active_voxels());
-    take_cycles(*solver, options, solver->step(options.stepper, options.dt), report.noise, report,
-                progress.part(0.1, 1));
+    const double step = solver->step(options.stepper, options.dt);
+    report.resumed_cycles =
+        with_checkpoints(*solver, blocks.checkpoint, options.text(), nullptr, [&](CycleSolver& s) {
+            take_cycles(s, options, step, report.noise, report, progress.part(0.1, 1));
+        });
     solver->describe(report);
     return solver;
 }
@@ -364,8 +422,11 @@ std::unique_ptr<BlockedDiffusion> coupled_high_pass_blocks(const MapSource& sour
     auto solver = std::make_unique<BlockedDiffusion>(source, high_pass_fields(options), options.sigma, blocks,
                                                      progress.part(0, 0.1));
     if (solver->active_voxels() == 0) return nullptr;
-    take_high_pass_cycles(*solver, options, solver->step(options.stepper, options.dt), report,
-                          progress.part(0.1, 1));
+    const double step = solver->step(options.stepper, options.dt);
+    report.resumed_cycles =
+        with_checkpoints(*solver, blocks.checkpoint, options.text(), nullptr, [&](CycleSolver& s) {
+            take_high_pass_cycles(s, options, step, report, progress.part(0.1, 1));
+        });
     solver->describe(report);
     return solver;
 }

@@ -32,6 +32,7 @@ struct BlockOptions {
     /// Blocks of this size (at multiples of 32, 32 and 128 voxels) and so many steps; unset: as memory goes.
     std::optional<openvdb::Coord> size;
     std::optional<int> steps;
+    CheckpointOptions checkpoint;
 };
 
 /// The same values as DiffusionSolver's, to the bit, whatever the blocks. A block is read with so many ghosts
@@ -50,6 +51,10 @@ class BlockedDiffusion : public CycleSolver {
     void cycle(Stepper stepper, int n, double tau, const Progress& progress) override;
     void reset() override;
     double removed() override;
+    std::uint64_t input_hash() override { return input_hash_; }
+    std::size_t fields() const override { return problem_.fields.size(); }
+    void save(StateWriter& writer) override;
+    void load(const StateReader& reader) override;
     void describe(HyperdiffusionReport& report);
     /// Of X, less its mean.
     const stencil::FieldSummary& before() const { return before_; }
@@ -70,6 +75,7 @@ class BlockedDiffusion : public CycleSolver {
     std::uint64_t memory_for_blocks() const;
     BlockPlan plan(const BlockWork& work, const BrickIndex* index) const;
     BlockPlan reading_plan(int ghosts) const;
+    BlockPlan copying_plan(int ghosts) const;
     BlockWork work_of(Stepper stepper, int n) const;
     openvdb::FloatGrid::Ptr read(const openvdb::CoordBBox& box) const;
     void find_mean(const Progress& progress);
@@ -92,6 +98,7 @@ class BlockedDiffusion : public CycleSolver {
     std::vector<stencil::FieldSummary> summary_;
     EdgeMeasure first_measure_, measure_;
     float offset_ = 0;
+    std::uint64_t input_hash_ = 0;
     std::size_t most_blocks_ = 0, most_memory_ = 0;
 };
 

@@ -10,6 +10,9 @@
 
 namespace vdbgeo {
 
+class StateReader;
+class StateWriter;
+
 /// Cycles of n steps of τ each.
 struct CycleRun {
     int cycles = 0, n = 0;
@@ -49,6 +52,13 @@ class CycleSolver {
     virtual void reset() = 0;
     /// Root mean square of X − u over the active voxels, of the first field.
     virtual double removed() = 0;
+
+    /// A number that tells X from other maps; of all members.
+    virtual std::uint64_t input_hash() = 0;
+    /// How many fields there are; between cycles they are all there is to know.
+    virtual std::size_t fields() const = 0;
+    virtual void save(StateWriter& writer) = 0;
+    virtual void load(const StateReader& reader) = 0;
 
     /// Takes the cycles and adds them to the report's steps, time, cycles; its dt becomes τ.
     void run(Stepper stepper, const std::vector<CycleRun>& cycles, HyperdiffusionReport& report,

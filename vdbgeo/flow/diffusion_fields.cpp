@@ -11,6 +11,7 @@
 #include "vdbgeo/flow/cycles.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/line_solve.h"
+#include "vdbgeo/stencil/plane_kernels.h"
 
 namespace vdbgeo {
 
@@ -86,6 +87,23 @@ DiffusionFields::DiffusionFields(const DiffusionProblem& problem, BlockLayout la
     }
     if (problem.fields.size() == 1 && problem.fields[0].coupling > 0)
         input_ = BlockField(layout_.brick_count());
+}
+
+void DiffusionFields::clear_rest() {
+    const auto fill = [](float* begin, const float* end, float value) {
+        const auto count = static_cast<std::size_t>(end - begin);
+        parallel_blocks(count, 1 << 17,
+                        [&](std::size_t from, std::size_t to) { std::fill(begin + from, begin + to, value); });
+    };
+    for (State& s : states_) {
+        BlockField &now = s.now.all(), &before = s.before.all();
+        const std::size_t values = layout_.brick_count() * BlockField::brick_size;
+        fill(now.brick(0), s.now.now(), 0);
+        fill(s.now.now() + values, now.brick(now.bricks()), 0);
+        fill(before.brick(0), before.brick(before.bricks()), 0);
+        for (BlockField& d : s.diffusivities)
+            if (!d.empty()) fill(d.brick(0), d.brick(d.bricks()), stencil::inactive);
+    }
 }
 
 void DiffusionFields::load(const openvdb::FloatTree& x, float offset) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/state_file.h"
 #include "vdbgeo/stencil/diffusivity.h"
 
 namespace vdbgeo {
@@ -132,6 +133,25 @@ void DiffusionSolver::describe(HyperdiffusionReport& report) {
 
 void DiffusionSolver::reset() {
     fields_.load(grid_.tree(), offset_);
+    summarize();
+}
+
+std::uint64_t DiffusionSolver::input_hash() {
+    const BlockLayout& layout = fields_.layout();
+    stencil::BlockField x(layout.brick_count());
+    stencil::load(layout, grid_.tree(), offset_, x.brick(0));
+    std::vector<std::uint64_t> hash{stencil::hash_of_bricks(layout, x.brick(0))};
+    if (team()) team()->add_up(hash);
+    return hash[0];
+}
+
+void DiffusionSolver::save(StateWriter& writer) {
+    const std::vector<float*> now = fields_.states(false);
+    writer.add(fields_.layout(), {now.begin(), now.end()});
+}
+
+void DiffusionSolver::load(const StateReader& reader) {
+    reader.read(fields_.layout(), fields_.states(false));
     summarize();
 }
 

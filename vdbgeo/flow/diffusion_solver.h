@@ -39,6 +39,10 @@ class DiffusionSolver : public CycleSolver {
     void cycle(Stepper stepper, int n, double tau, const Progress& progress = {}) override;
     void reset() override;
     double removed() override;
+    std::uint64_t input_hash() override;
+    std::size_t fields() const override { return problem_.fields.size(); }
+    void save(StateWriter& writer) override;
+    void load(const StateReader& reader) override;
     /// Voxels, means, what was removed, memory.
     void describe(HyperdiffusionReport& report);
     /// Writes the first field into the grid's active voxels; with two fields their difference.

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/checkpoint.h"
 #include "vdbgeo/flow/cycles.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/noise.h"
@@ -92,6 +93,18 @@ double HyperdiffusionOptions::largest_rate(const Vec3d& weights) const {
     return rate;
 }
 
+std::string HyperdiffusionOptions::text() const {
+    std::string out = fmt::format("hyperdiffusion sigma {} {:a} {:a} {}", static_cast<int>(sigma.kind),
+                                  sigma.value, sigma.factor, sigma.radius);
+    for (const DiffusionTerm& t : terms) out += fmt::format(" term {} {:a}", t.order, t.diffusivity);
+    out += fmt::format(" stepper {} cycles {} fidelity {:a}", static_cast<int>(stepper), min_cycles, fidelity);
+    if (time) out += fmt::format(" time {:a}", *time);
+    if (steps) out += fmt::format(" steps {}", *steps);
+    if (dt) out += fmt::format(" dt {:a}", *dt);
+    if (cycle) out += fmt::format(" cycle {}", *cycle);
+    return out;
+}
+
 Vec3d axis_weights(const openvdb::math::Transform& transform) {
     const Vec3d h = frame_of(transform).voxel_size();
     Vec3d w;
@@ -106,7 +119,8 @@ int hyperdiffusion_halo(const HyperdiffusionOptions& options) {
 }
 
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options,
-                                  const Progress& progress, const stencil::Share* share) {
+                                  const Progress& progress, const stencil::Share* share,
+                                  const CheckpointOptions& checkpoint) {
     options.check();
     check_halo(share, hyperdiffusion_halo(options));
     HyperdiffusionReport report;
@@ -117,7 +131,9 @@ HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const Hyperdiffusion
     DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma, share);
     if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
-    take_cycles(solver, options, step, report.noise, report, progress);
+    report.resumed_cycles =
+        with_checkpoints(solver, checkpoint, options.text(), share ? share->team : nullptr,
+                         [&](CycleSolver& s) { take_cycles(s, options, step, report.noise, report, progress); });
     solver.describe(report);
     if (report.steps) solver.store(grid);
     return report;

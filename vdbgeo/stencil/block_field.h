@@ -60,6 +60,10 @@ class FieldTotal {
     CellTotal<FieldSummary> total_;
 };
 
+/// A number that tells this field, and where it lies, from others: of the own cells, to be added up over the
+/// parts of a grid (it wraps around).
+std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks);
+
 /// Σ (a − b)² over the active voxels, in the same order.
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team = nullptr);
 

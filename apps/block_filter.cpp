@@ -19,11 +19,24 @@ using openvdb::FloatGrid;
 
 constexpr std::uint64_t megabyte = std::uint64_t(1) << 20;
 
+std::filesystem::path scratch_of(const MapFilterFlags& flags) {
+    const std::filesystem::path& given = flags.map.options.scratch;
+    return given.empty() ? std::filesystem::absolute(flags.out).parent_path() : given;
+}
+
 /// What reading may take of the memory: strips of the file.
-MapReadOptions reading(const MapReadOptions& options) {
-    MapReadOptions out = options;
-    out.memory = options.memory_limit() / 4;
+MapReadOptions reading(const MapFilterFlags& flags) {
+    MapReadOptions out = flags.map.options;
+    out.memory = out.memory_limit() / 4;
+    out.scratch = scratch_of(flags);
     return out;
+}
+
+/// What is left of the memory for blocks: the program itself, strips of the file and nodes of trees that come
+/// and go take the rest.
+std::uint64_t memory_for_blocks(std::uint64_t limit, std::uint64_t held) {
+    const std::uint64_t taken = 96 * megabyte + held + limit / 6;
+    return limit > taken ? limit - taken : 0;
 }
 
 }  // namespace
@@ -33,11 +46,12 @@ bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need) {
     if (flags.in == "-") return false;
     if (is_map_parts(flags.in)) return true;
     const auto samples = samples_in_file(flags, options.memory.has_value());
-    return samples && *samples * need.bytes_a_voxel > static_cast<double>(options.memory_limit());
+    return samples && *samples * need.bytes_a_voxel > static_cast<double>(options.memory_limit()) &&
+           memory_for_blocks(options.memory_limit(), 0) > 0;
 }
 
 BlockFilter::BlockFilter(const MapFilterFlags& flags, Session& session)
-    : flags_(flags), map_(flags.in, reading(flags.map.options), session.stage("opening")) {
+    : flags_(flags), map_(flags.in, reading(flags), session.stage("opening")) {
     session.end_stage();
     if (!map_.frame().bounded())
         throw InvalidInput(flags.in + ": the grid has no box, which blocks of it need; vdbgeo convert makes one");
@@ -51,13 +65,10 @@ MapSource BlockFilter::source() const {
             [this](const CoordBBox& box) { return map_.read(box).grid; }};
 }
 
-/// Strips of the file come and go, and so do nodes of trees; the rest is for the blocks.
 BlockOptions BlockFilter::options() const {
-    const MapReadOptions& read = flags_.map.options;
     BlockOptions out;
-    const std::uint64_t limit = read.memory_limit(), taken = 96 * megabyte + map_.memory() + limit / 6;
-    out.memory = limit > taken ? limit - taken : 0;
-    out.scratch = read.scratch.empty() ? std::filesystem::absolute(flags_.out).parent_path() : read.scratch;
+    out.memory = memory_for_blocks(flags_.map.options.memory_limit(), map_.memory());
+    out.scratch = scratch_of(flags_);
     return out;
 }
 

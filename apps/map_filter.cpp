@@ -66,6 +66,8 @@ void MapFilterFlags::add(CLI::App& app, const std::string& out_text) {
     map.add_reading(app);
     map.add_sparsify(app);
     map.add_memory(app);
+    app.add_option("--scratch", map.options.scratch,
+                   "Folder for what does not fit into the memory, for as long as it takes [that of OUT]");
     add_vdb_flags(app, vdb);
     app.add_option("--mode", mrc.mode, "MRC mode to write: 0, 1, 2, 6, 12 or 101 [2]");
     add_map_output_flags(app, mrc);

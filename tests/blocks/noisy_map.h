@@ -12,11 +12,11 @@ namespace vdbgeo::test {
 inline const openvdb::CoordBBox noisy_box(openvdb::Coord(-20, -40, -60), openvdb::Coord(90, 110, 200));
 
 /// A dense ball in noise, with a hole where nothing is active and sparse leaves around it.
-inline openvdb::FloatGrid::Ptr noisy_map() {
+inline openvdb::FloatGrid::Ptr noisy_map(const openvdb::CoordBBox& box = noisy_box) {
     SparseMaker make(7);
     auto grid = make.grid();
     auto to = grid->getAccessor();
-    for (auto c = noisy_box.begin(); c; ++c) {
+    for (auto c = box.begin(); c; ++c) {
         const openvdb::Coord at = *c;
         const Vec3d p(at.x() - 30, at.y() - 35, 0.6 * (at.z() - 70));
         const double r = p.norm();

@@ -217,7 +217,8 @@ BlockPlan plan_blocks(const CoordBBox& box, const BlockWork& work, std::uint64_t
         return {c.size, c.steps, planner.halo_of(c.steps), blocks_of(box, c.size, index)};
     }
     throw NumericalError(fmt::format(
-        "the smallest blocks take {:.0f} MB beside what is needed anyway, and {:.0f} MB are left of the memory",
+        "the smallest blocks take {:.0f} MB, and {:.0f} MB are left for them; try --bin 2, --crop, --threshold "
+        "or a larger --memory",
         least / 1e6, double(bytes) / 1e6));
 }
 

@@ -70,8 +70,9 @@ TEST_P(BlockedHyperdiffusion, HasTheBitsOfOneGrid) {
             alone = hyperdiffuse(*expected, setting.options);
         }
         HyperdiffusionReport report;
-        const BlockOptions options{shape.memory, folder.path(), shape.size, shape.steps};
-        const auto solver = hyperdiffuse_blocks(source_of(*input), setting.options, options, report);
+        const BlockOptions options{shape.memory, folder.path(), shape.size, shape.steps, {}};
+        std::unique_ptr<BlockedDiffusion> solver;
+        ASSERT_NO_THROW(solver = hyperdiffuse_blocks(source_of(*input), setting.options, options, report));
         ASSERT_TRUE(solver);
         EXPECT_GT(solver->most_blocks(), shape.name == std::string("large") ? 0u : 1u);
         EXPECT_EQ(report.steps, alone.steps);
@@ -107,7 +108,7 @@ TEST(BlockedHighPass, HasTheBitsOfOneGrid) {
         for (const std::optional<int> steps : {std::optional<int>(), std::optional<int>(8)}) {
             HyperdiffusionReport report;
             const auto solver = coupled_high_pass_blocks(
-                source_of(*input), options, {0, folder.path(), Coord(64, 64, 128), steps}, report);
+                source_of(*input), options, {0, folder.path(), Coord(64, 64, 128), steps, {}}, report);
             ASSERT_TRUE(solver);
             EXPECT_EQ(report.mean_after, alone.mean_after);
             EXPECT_EQ(report.removed, alone.removed);
@@ -122,14 +123,14 @@ TEST(BlockedHyperdiffusionErrors, AreThoseOfOneGrid) {
     HyperdiffusionOptions o;
     o.steps = 3;
     HyperdiffusionReport report;
-    const BlockOptions blocks{0, folder.path(), Coord(64, 64, 128), {}};
+    const BlockOptions blocks{0, folder.path(), Coord(64, 64, 128), {}, {}};
     HyperdiffusionOptions adi = o;
     adi.stepper = Stepper::adi;
     EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), adi, blocks, report), InvalidInput);
-    EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, {1000, folder.path(), {}, {}}, report),
+    EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, {1000, folder.path(), {}, {}, {}}, report),
                  NumericalError);
     EXPECT_THROW(
-        hyperdiffuse_blocks(source_of(*input), o, {0, "/not/there", Coord(64, 64, 128), {}}, report), IoError);
+        hyperdiffuse_blocks(source_of(*input), o, {0, "/not/there", Coord(64, 64, 128), {}, {}}, report), IoError);
     input->tree().setValueOn(Coord(30, 70, 70), std::nanf(""));
     EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, blocks, report), InvalidInput);
     const FloatGrid::Ptr empty = test::empty_grid();

@@ -88,7 +88,7 @@ std::uint64_t BlockedDiffusion::memory_for_blocks() const {
 
 BlockPlan BlockedDiffusion::plan(const BlockWork& work, const BrickIndex* index) const {
     if (!options_.size) return plan_blocks(source_.box, work, memory_for_blocks(), index);
-    const int steps = std::min(work.steps, options_.steps.value_or(work.steps));
+    const int steps = std::max(work.steps_a_sweep, std::min(work.steps, options_.steps.value_or(work.steps)));
     return {*options_.size, steps, block_halo(work, steps, true, true),
             blocks_of(source_.box, *options_.size, index)};
 }

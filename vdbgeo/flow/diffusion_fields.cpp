@@ -11,7 +11,6 @@
 #include "vdbgeo/flow/cycles.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/line_solve.h"
-#include "vdbgeo/stencil/plane_kernels.h"
 
 namespace vdbgeo {
 
@@ -102,7 +101,7 @@ void DiffusionFields::clear_rest() {
         fill(s.now.now() + values, now.brick(now.bricks()), 0);
         fill(before.brick(0), before.brick(before.bricks()), 0);
         for (BlockField& d : s.diffusivities)
-            if (!d.empty()) fill(d.brick(0), d.brick(d.bricks()), stencil::inactive);
+            if (!d.empty()) fill(d.brick(0), d.brick(d.bricks()), 0);
     }
 }
 

@@ -60,7 +60,8 @@ class DiffusionFields {
     stencil::BlockLayout& layout() { return layout_; }
     const stencil::BlockLayout& layout() const { return layout_; }
     /// Makes all values but those of `now` finite, and nothing flow: for blocks, where cells that nobody needs
-    /// are not computed, and what is read of them must not be an infinity.
+    /// are not computed, and what is read of them must not become an infinity. (`inactive` would: kernels trust
+    /// full leaves.)
     void clear_rest();
     /// All fields, and the target of one, become X − offset.
     void load(const openvdb::FloatTree& x, float offset);

@@ -140,7 +140,7 @@ std::vector<BlockLayout::Run> BlockLayout::runs(const Slab& slab, int length) co
     for (std::size_t i = slab.first_cell; i < slab.last_cell; ++i) {
         if (!cells_[i].own) continue;
         const Coord& o = cells_[i].origin;
-        const bool goes_on = !out.empty() && i > slab.first_cell &&
+        const bool goes_on = !out.empty() && i > slab.first_cell && cells_[i - 1].own &&
                              cells_[i - 1].origin == o.offsetBy(-size_x, 0, 0) &&
                              (o.x() / size_x) % length != 0 && out.back().last - out.back().first < length;
         if (goes_on)

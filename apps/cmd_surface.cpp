@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 
 #include "apps/command.h"
 #include "apps/flags.h"
@@ -9,9 +10,9 @@
 #include "apps/mesh_command.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/surface_in_blocks.h"
 #include "apps/team_filter.h"
 #include "converters/mesh_file.h"
-#include "converters/mesh_pieces.h"
 #include "vdbgeo/blocks/team_marching_cubes.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/label_surfaces.h"
@@ -97,14 +98,79 @@ void run_labels(const SurfaceOptions& o, const MapFile& in, Json seconds, Clock&
     finish(mesh, o, {{"method", "labels"}, {"labels", rows}}, lines, seconds, clock, session);
 }
 
+/// Whether the surface is made and written block after block where the map does not fit.
+bool streams(const SurfaceOptions& o) {
+    return o.surface.method == "marching-cubes" && !o.surface.cap && !o.split && !o.components.any() &&
+           o.labels.empty();
+}
+
+/// What the surface of a map that is in memory takes.
+WholeNeed need_of(const SurfaceOptions& o) {
+    if (!o.labels.empty()) return WholeNeed::of_labels();
+    if (o.surface.method == "dual") return WholeNeed::of_dual();
+    if (o.surface.method == "delaunay") return WholeNeed::of_delaunay();
+    return streams(o) ? WholeNeed{} : WholeNeed::of_pieces();
+}
+
+void write_in_blocks(const SurfaceOptions& o, const Isovalue& rule, SurfaceInBlocks& surface, Json seconds,
+                     Clock& clock, Session& session) {
+    if (!has_ending(o.out, ".ply"))
+        throw UsageError(
+            fmt::format("{}: a surface that does not fit into --memory is written as .ply; vdbgeo convert "
+                        "makes others of it",
+                        o.out));
+    surface.write(o.out, session);
+    seconds["write"] = clock.lap();
+    if (!session.json) {
+        session.say(fmt::format("isovalue    {:.6g} ({})", surface.isovalue(), rule.text()));
+        session.say(fmt::format("surface     {} vertices, {} faces, in {} blocks", surface.vertices(),
+                                surface.triangles(), surface.blocks()));
+    }
+    session.result({{"vertices", surface.vertices()},
+                    {"faces", surface.triangles()},
+                    {"iso", surface.isovalue()},
+                    {"iso_rule", rule.text()},
+                    {"method", o.surface.method},
+                    {"blocks", surface.blocks()},
+                    {"seconds", seconds}});
+}
+
+/// Within --memory: the map, if it and its surface fit. Else nothing: then the surface is written.
+std::optional<MapFile> read_if_it_fits(const SurfaceOptions& o, const Isovalue& rule, Json& seconds,
+                                       Clock& clock, Session& session) {
+    check_folder_of(o.out);
+    MapReadOptions options = o.map.options;
+    if (options.scratch.empty()) options.scratch = std::filesystem::absolute(o.out).parent_path();
+    const Isovalue any_label{Isovalue::Rule::value, 0.5};
+    SurfaceInBlocks surface(o.in, options, o.labels.empty() ? rule : any_label, session);
+    seconds["count"] = clock.lap();
+    const double bytes = surface.bytes_as_whole(need_of(o));
+    if (bytes <= static_cast<double>(options.memory_limit())) return surface.whole(session);
+    if (!streams(o))
+        throw NumericalError(fmt::format(
+            "{}: the map and its surface take about {:.1f} GB, more than --memory; marching cubes without "
+            "--cap, --split, --labels and flags that drop pieces goes through the map in blocks; or try "
+            "--crop or --bin 2",
+            o.in, bytes / (1 << 30)));
+    write_in_blocks(o, rule, surface, seconds, clock, session);
+    return {};
+}
+
 void run_surface(const SurfaceOptions& o, Session& session) {
     check_mesh_output(o.out);
     const Isovalue rule = o.iso.parse();
     Json seconds;
     Clock clock;
-    const MapFile in = read_map(o.in, o.map.options, session.stage("reading"));
+    std::optional<MapFile> read;
+    if (o.map.options.memory) {
+        read = read_if_it_fits(o, rule, seconds, clock, session);
+        if (!read) return;
+    } else {
+        read = read_map(o.in, o.map.options, session.stage("reading"));
+        for (const std::string& w : read->warnings) session.warn(o.in + ": " + w);
+    }
+    const MapFile& in = *read;
     seconds["read"] = clock.lap();
-    for (const std::string& w : in.warnings) session.warn(o.in + ": " + w);
     if (!o.labels.empty()) return run_labels(o, in, seconds, clock, session);
     const Surface surface = extract_surface(o.in, in, rule, session.stage("surface"), o.surface);
     const TriMesh mesh = keep_pieces(surface.mesh, o, session);
@@ -122,6 +188,46 @@ void check_for_team(const SurfaceOptions& o, const Isovalue& rule) {
             "pieces and labels: a team writes the surface whole; vdbgeo components takes it apart");
     if (rule.needs_samples())
         throw UsageError("--iso: a team takes a density, a number of sigmas, record:FILE or auto");
+}
+
+/// Takes a file away unless it was kept, or a failure comes first.
+class Unfinished {
+ public:
+    explicit Unfinished(std::string name) : name_(std::move(name)) {}
+    ~Unfinished() {
+        std::error_code ignored;
+        if (!name_.empty()) std::filesystem::remove(name_, ignored);
+    }
+    Unfinished(const Unfinished&) = delete;
+    Unfinished& operator=(const Unfinished&) = delete;
+
+    const std::string& name() const { return name_; }
+    void keep() { name_.clear(); }
+
+ private:
+    std::string name_;
+};
+
+/// All members write into one file, which the first makes and puts in its place.
+void write_by_team(const TeamSurface& surface, const std::string& out, Team& team, const Progress& progress) {
+    Unfinished unfinished(out + ".unfinished");
+    std::optional<PlyPieces> file;
+    const bool first = team.rank() == 0;
+    if (first) file.emplace(unfinished.name(), true, surface.vertices, surface.triangles);
+    wait_for_all(team);
+    if (!first) file.emplace(unfinished.name(), false, surface.vertices, surface.triangles);
+    if (first) file->put_header();
+    put_piece(surface.piece, *file);
+    progress.report(0.5);
+    file->close();
+    wait_for_all(team);
+    if (first) {
+        std::error_code error;
+        std::filesystem::rename(unfinished.name(), out, error);
+        if (error) throw IoError(fmt::format("{}: cannot be written: {}", out, error.message()));
+    }
+    unfinished.keep();
+    wait_for_all(team);
 }
 
 /// Every member extracts the surface in its part and puts it where it belongs in the one file.
@@ -149,30 +255,7 @@ void run_surface_by_team(const SurfaceOptions& o, Session& session) {
                         o.in, iso, part.statistics.min, part.statistics.max));
     seconds["compute"] = clock.lap();
     const Progress progress = session.stage("writing");
-    const std::string unfinished = o.out + ".unfinished";
-    std::error_code error;
-    if (team.rank() == 0) std::filesystem::remove(unfinished, error);
-    wait_for_all(team);
-    PlyPieces file(unfinished, surface.vertices, surface.triangles);
-    if (team.rank() == 0) file.put_header();
-    const Vec3f* points = surface.piece.points.data();
-    for (const SurfaceRun& run : surface.piece.point_runs) {
-        file.put_points(run.first, points, run.count);
-        points += run.count;
-    }
-    const Triangle* triangles = surface.piece.triangles.data();
-    for (const SurfaceRun& run : surface.piece.triangle_runs) {
-        file.put_triangles(run.first, triangles, run.count);
-        triangles += run.count;
-        progress.report(0.5);
-    }
-    file.close();
-    wait_for_all(team);
-    if (team.rank() == 0) {
-        std::filesystem::rename(unfinished, o.out, error);
-        if (error) throw IoError(fmt::format("{}: cannot be written: {}", o.out, error.message()));
-    }
-    wait_for_all(team);
+    write_by_team(surface, o.out, team, progress);
     session.end_stage();
     seconds["write"] = clock.lap();
     std::vector<std::uint64_t> sent{surface.bytes_sent};
@@ -196,10 +279,11 @@ void run_surface_by_team(const SurfaceOptions& o, Session& session) {
 Command surface_command() {
     return {"surface", "Extract the surface of a map or grid at an isovalue, or those of a segmentation",
             "  vdbgeo surface emd_1080.map groel.ply --iso 0.8\n"
+            "  vdbgeo surface emd_1080.map large.ply --iso 0.8 --memory 2G\n"
             "  vdbgeo surface emd_1080.map good.ply --iso 0.8 --method delaunay --keep-largest 1",
             [](CLI::App& app) {
                 auto o = std::make_shared<SurfaceOptions>();
-                app.add_option("in", o->in, "Map (MRC, CCP4) or VDB grid")->required();
+                app.add_option("in", o->in, "Map (MRC, CCP4), VDB grid, or a folder of parts")->required();
                 app.add_option("out", o->out, "Mesh to write: " + mesh_endings_text())->required();
                 o->iso.add(app);
                 o->surface.add(app);
@@ -214,6 +298,14 @@ Command surface_command() {
                     ->capture_default_str();
                 o->map.add_reading(app);
                 o->map.add_sparsify(app);
+                o->map.add_memory(app);
+                app.get_option("--memory")
+                    ->description(
+                        "Memory that may be taken, such as 2G or 512M: where map and surface do not fit, "
+                        "marching "
+                        "cubes goes through the map in blocks, into a .ply file [as it comes]");
+                app.add_option("--scratch", o->map.options.scratch,
+                               "Folder for temporary files, which have no name [the output's]");
                 return [o, flags = &app](Session& session) {
                     o->map.finish();
                     o->surface.finish(*flags);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/surface_in_blocks.h"
 #include "converters/mesh_file.h"
 #include "converters/nanovdb_file.h"
 #include "vdbgeo/view/colormap.h"
@@ -20,11 +21,7 @@ Surface extract_surface(const std::string& name, const MapFile& in, const Isoval
         surface.isovalue = rule.resolve(in.map);
         surface.mesh = flags.extract(in, surface.isovalue, progress);
     });
-    if (surface.mesh.empty())
-        throw NumericalError(
-            fmt::format("{}: no surface at the isovalue {:.6g}: the map's values lie between {:.6g} and "
-                        "{:.6g}; try another --iso",
-                        name, surface.isovalue, in.map.statistics.min, in.map.statistics.max));
+    need_surface(name, surface.mesh.triangles.size(), surface.isovalue, in.map.statistics);
     return surface;
 }
 

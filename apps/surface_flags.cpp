@@ -4,6 +4,7 @@
 #include <openvdb/tools/ValueTransformer.h>
 
 #include "apps/flags.h"
+#include "apps/surface_in_blocks.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/surface/cap.h"
 #include "vdbgeo/surface/marching_cubes.h"
@@ -93,14 +94,7 @@ DensityMap turned_over(const DensityMap& level_set) {
     DensityMap map = level_set;
     map.grid = openvdb::FloatGrid::create(*level_set.grid);
     map.grid->setTree(std::make_shared<openvdb::FloatTree>(level_set.grid->tree()));
-    openvdb::tools::foreach (map.grid->beginValueAll(),
-                             [](const openvdb::FloatGrid::ValueAllIter& it) { it.setValue(-*it); });
-    map.grid->tree().root().setBackground(-map.grid->background(), false);
-    map.grid->setGridClass(openvdb::GRID_UNKNOWN);
-    std::swap(map.statistics.min, map.statistics.max);
-    map.statistics.min *= -1;
-    map.statistics.max *= -1;
-    map.statistics.mean *= -1;
+    turn_over(map);
     return map;
 }
 

@@ -22,10 +22,11 @@ struct MapFile {
     std::vector<std::string> notes;     ///< what was done that the user may want to know, one line each
 };
 
-/// Reads a map: VDB by its signature, else MRC or CCP4. MRC samples stream into leaves while the next ones
-/// are being read: memory holds the kept leaves and little else. The grid's metadata tell where it came from
-/// (`mrc_*`, `vdbgeo_history`). What is written back after samples became other numbers (binning, scales) has
-/// mode 2. Errors as MrcReader, StripSource and read_vdb; Cancelled.
+/// Reads a map: VDB by its signature, a folder of parts (MapParts), else MRC or CCP4. MRC samples stream into
+/// leaves while the next ones are being read: memory holds the kept leaves and little else. The grid's
+/// metadata tell where it came from (`mrc_*`, `vdbgeo_history`). What is written back after samples became
+/// other numbers (binning, scales) has mode 2. Errors as MrcReader, StripSource, read_vdb and MapParts;
+/// Cancelled.
 MapFile read_map(const std::filesystem::path& path, const MapReadOptions& options = {},
                  const Progress& progress = {});
 

@@ -30,12 +30,18 @@ std::string ply_header(std::uint64_t vertices, std::uint64_t triangles, const st
         vertices, of_vertices, triangles, index, of_faces);
 }
 
-PlyPieces::PlyPieces(const std::filesystem::path& path, std::uint64_t vertices, std::uint64_t triangles)
+PlyPieces::PlyPieces(AtomicFile& file, std::uint64_t vertices, std::uint64_t triangles)
+    : file_(&file),
+      header_(ply_header(vertices, triangles)),
+      first_triangle_at_(header_.size() + vertices * point_bytes) {}
+
+PlyPieces::PlyPieces(const std::filesystem::path& path, bool make, std::uint64_t vertices,
+                     std::uint64_t triangles)
     : path_(path),
       header_(ply_header(vertices, triangles)),
       first_triangle_at_(header_.size() + vertices * point_bytes) {
     static_assert(sizeof(Vec3f) == point_bytes && sizeof(Triangle) == 12);
-    fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    fd_ = ::open(path.c_str(), O_RDWR | (make ? O_CREAT | O_TRUNC : 0) | O_CLOEXEC, 0666);
     if (fd_ < 0) fail("cannot be opened");
 }
 
@@ -48,6 +54,7 @@ void PlyPieces::fail(const char* doing) const {
 }
 
 void PlyPieces::write_at(std::uint64_t at, const void* data, std::size_t bytes) {
+    if (file_) return file_->write_at(at, data, bytes);
     for (const char* from = static_cast<const char*>(data); bytes > 0;) {
         const ssize_t written = ::pwrite(fd_, from, bytes, static_cast<off_t>(at));
         if (written < 0 && errno == EINTR) continue;

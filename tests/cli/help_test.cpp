@@ -37,7 +37,7 @@ const std::vector<Promise> promises{
     {"flow", {"--surface", "voxels^2", "--iso TEXT=auto", "signed distances in Å", "--density-scale"}},
     {"surface",
      {"--iso TEXT=auto", "in the map's units", "Nsigma", "Voxel size in Å", "--method TEXT=marching-cubes",
-      "in voxels, or in Å", "in Å³", "in Å²", "in seconds"}},
+      "in voxels, or in Å", "in Å³", "in Å²", "in seconds", "--memory", "--scratch", "[as it comes]"}},
     {"remesh", {"--method TEXT=isotropic", "in Å", "in degrees", "[mean edge of the input]"}},
     {"simplify", {"--faces", "in Å"}},
     {"smooth", {"--method TEXT=taubin", "in Å^4"}},

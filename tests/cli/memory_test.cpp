@@ -57,6 +57,24 @@ TEST_F(Memory, ABudgetHoldsAndChangesNoByte) {
     EXPECT_TRUE(bytes("back.mrc").substr(1024) == bytes("big.mrc").substr(1024));
 }
 
+TEST_F(Memory, ASurfaceInBlocksKeepsToIt) {
+    // Whole the grid takes 400 MB; the surface is that of a hundred thousand voxels.
+    const auto surface = [this](const std::string& out, const Words& how) {
+        Words words{"surface", at("big.mrc"), at(out), "--iso", "32700", "-j", "2"};
+        words.insert(words.end(), how.begin(), how.end());
+        return good(words);
+    };
+    const Ended small = surface("small.ply", {"--memory", "96M"});
+    const Ended middle = surface("middle.ply", {"--memory", "256M"});
+    const Ended whole = surface("whole.ply", {});
+    EXPECT_LT(small.peak_bytes, 96u << 20);
+    EXPECT_LT(middle.peak_bytes, 256u << 20);
+    EXPECT_GT(whole.peak_bytes, 400u << 20);
+    EXPECT_NE(small.out.find(" blocks"), std::string::npos) << small.out;
+    EXPECT_TRUE(bytes("small.ply") == bytes("whole.ply"));
+    EXPECT_TRUE(bytes("middle.ply") == bytes("whole.ply"));
+}
+
 TEST_F(Cli, MemorySizesThatAreNoneAreRefused) {
     const std::string map = phantom("a.mrc", 16);
     for (const char* size : {"0", "-1G", "1X", "G", "12", "1M"})

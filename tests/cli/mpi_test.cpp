@@ -159,6 +159,11 @@ TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {
     expect(2, {"surface", map, at("b.ply"), "--iso", "otsu"}, 2, "a team takes a density");
     expect(2, {"surface", map, at("b.stl"), "--iso", "0"}, 2, "a team writes .ply");
     EXPECT_EQ(listing(), std::set<std::string>{"a.mrc"});
+    // The surface is there, but cannot be put in its place.
+    const std::string noise = noisy();
+    fs::create_directory(at("b.ply"));
+    expect(2, {"surface", noise, at("b.ply"), "--iso", "1"}, 4, "b.ply: cannot be written");
+    EXPECT_EQ(listing(), (std::set<std::string>{"a.mrc", "b.ply"}));
 }
 
 #endif

@@ -138,6 +138,7 @@ void AtomicFile::Sink::flush_buffer() {
 
 void AtomicFile::Sink::write_at(std::int64_t position, const char* data, std::size_t bytes) {
     flush_buffer();
+    const std::int64_t begin = position;
     while (bytes > 0) {
         const ssize_t n = ::pwrite(fd_, data, bytes, position);
         if (n < 0 && errno == EINTR) continue;
@@ -149,6 +150,9 @@ void AtomicFile::Sink::write_at(std::int64_t position, const char* data, std::si
         bytes -= static_cast<std::size_t>(n);
         position += n;
     }
+    // Large pieces are on their way to the disk at once, as in write_all.
+    if (!direct_ && position - begin >= static_cast<std::int64_t>(buffer_bytes))
+        ::sync_file_range(fd_, begin, position - begin, SYNC_FILE_RANGE_WRITE);
 }
 
 void AtomicFile::Sink::read_at(std::int64_t position, char* out, std::size_t bytes) const {

@@ -1,5 +1,5 @@
 // vdbgeo-mpi under mpirun: the bytes of vdbgeo, for any number of processes.
-#include "tests/cli/cli_test.h"
+#include "tests/cli/mpi_run.h"
 
 using namespace vdbgeo::test;
 
@@ -9,29 +9,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class Mpi : public Cli {
+class Mpi : public MpiCli {
  protected:
-    void SetUp() override {
-        if (sanitized) GTEST_SKIP() << "NOT TESTED: mpirun and sanitizers do not go together";
-        const Ended probe = mpi(2, {"denoise", "--help"}, 1, std::chrono::seconds(30));
-        if (probe.code != 0) GTEST_SKIP() << "NOT TESTED: mpirun starts no processes here: " << probe.err;
-    }
-
-    /// mpirun with so many processes of so many threads.
-    static Ended mpi(int processes, const Words& words, int threads = 1,
-                     std::chrono::seconds patience = std::chrono::seconds(240)) {
-        Words all{MPIRUN_PROGRAM, "-q", "--allow-run-as-root",     "--oversubscribe", "--bind-to",
-                  "none",         "-n", std::to_string(processes), VDBGEO_MPI_PROGRAM};
-        all.insert(all.end(), words.begin(), words.end());
-        all.insert(all.end(), {"-j", std::to_string(threads)});
-        RunOptions options;
-        options.give_up = patience;
-        return run(all, options);
-    }
-
-    /// A noisy map of five by two cells.
-    std::string noisy() { return phantom("a.mrc", 160, {"--snr", "0.5"}, "atpase"); }
-
     /// The same command by vdbgeo and by so many processes.
     void expect_same(const Words& words, const std::string& ending, const std::vector<int>& processes) {
         SCOPED_TRACE(joined(words));

@@ -42,22 +42,10 @@ MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, in
     return map;
 }
 
-/// What lies above a band is tiles that are not active: parts of such maps lose leaves when they are written.
-static void refuse_bands(const std::string& name, const openvdb::FloatTree& tree, Team& team) {
-    std::vector<std::uint64_t> tiles{0};
-    auto tile = tree.cbeginValueOff();
-    tile.setMaxDepth(openvdb::FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) tiles[0] += *tile != tree.background();
-    team.add_up(tiles);
-    if (tiles[0] > 0)
-        throw InvalidInput(name + ": a map with a band is not filtered in parts yet: vdbgeo does it whole");
-}
-
 FilterInput read_filter_input(const MapFilterFlags& flags, const MemoryNeed& need, int halo,
                               Session& session) {
     if (!session.team) return {read_for_filter(flags, need, session), {}};
     MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
-    refuse_bands(flags.in, map.in.map.grid->constTree(), *session.team);
     FilterInput input{std::move(map.in), std::move(map.share)};
     need_samples(flags.in, active_moments(*input.in.map.grid, input.counted()), input.in.map.statistics);
     return input;

@@ -62,9 +62,8 @@ void write_map_part(const DensityMap& map, const CoordBBox& own, int number, con
         CoordBBox inside;
         tile.getBoundingBox(inside);
         inside.intersect(own);
-        for (auto at = inside.begin(); at != inside.end(); ++at)
-            if (((*at).x() & 7) == 0 && ((*at).y() & 7) == 0 && ((*at).z() & 7) == 0)
-                part->tree().addTile(1, *at, *tile, tile.isValueOn());
+        // Where they do not touch, the intersection still has corners, and they may lie among own leaves.
+        if (inside.hasVolume()) part->tree().sparseFill(inside, *tile, tile.isValueOn());
     }
     part->insertMeta(box_begin, openvdb::Vec3IMetadata(own.min().asVec3i()));
     part->insertMeta(box_end, openvdb::Vec3IMetadata(own.max().asVec3i()));

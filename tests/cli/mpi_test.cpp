@@ -89,6 +89,18 @@ TEST_F(Mpi, LeavesPartsThatMerge) {
     EXPECT_FALSE(fs::exists(at("bad.mrc")));
 }
 
+TEST_F(Mpi, MapsWithABand) {
+    phantom("ball.mrc", 160, {"--snr", "5"});
+    good({"convert", at("ball.mrc"), at("shell.vdb"), "--threshold", "0", "--band", "9", "--quiet"});
+    ASSERT_LT(json({"info", at("shell.vdb")})["active_voxels"], 160 * 160 * 160 / 2);
+    expect_same({"denoise", at("shell.vdb"), "--order", "0", "--steps", "3"}, ".vdb", {2, 5});
+    expect_same({"denoise", at("shell.vdb"), "--order", "0", "--steps", "3"}, ".mrc", {2});
+    expect_same(
+        {"denoise", at("ball.mrc"), "--threshold", "0", "--band", "9", "--order", "1", "--steps", "5"},
+        ".vdb", {2});
+    expect_same({"edges", at("shell.vdb"), "--order", "0", "--time", "0.2"}, ".vdb", {2});
+}
+
 TEST_F(Mpi, ExtractsTheSameSurface) {
     const std::string map = noisy();
     expect_same({"surface", map, "--iso", "1.5sigma"}, ".ply", {1, 2, 4, 5});
@@ -100,10 +112,6 @@ TEST_F(Mpi, ExtractsTheSameSurface) {
     good({"phantom", "sphere", at("ball.mrc"), "--size", "160", "--quiet"});
     good({"convert", at("ball.mrc"), at("shell.vdb"), "--threshold", "0", "--band", "9", "--quiet"});
     expect_same({"surface", at("shell.vdb"), "--iso", "0"}, ".ply", {2});
-    // Filters do not take such maps in parts yet, and say so.
-    const Ended banded = mpi(2, {"denoise", at("shell.vdb"), at("d.vdb"), "--order", "0", "--steps", "3"});
-    EXPECT_EQ(banded.code, 3);
-    EXPECT_NE(banded.err.find("a band is not filtered in parts"), std::string::npos) << banded.err;
     const Ended r = mpi(2, {"surface", map, at("b.ply"), "--iso", "1", "--json"});
     const Json told = Json::parse(r.out, nullptr, false),
                alone = json({"surface", map, at("c.ply"), "--iso", "1"});

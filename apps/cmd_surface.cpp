@@ -14,6 +14,7 @@
 #include "converters/mesh_pieces.h"
 #include "vdbgeo/blocks/team_marching_cubes.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/run_together.h"
 #include "vdbgeo/surface/label_surfaces.h"
 
 namespace vdbgeo::app {
@@ -124,6 +125,44 @@ void check_for_team(const SurfaceOptions& o, const Isovalue& rule) {
         throw UsageError("--iso: a team takes a density, a number of sigmas, record:FILE or auto");
 }
 
+void put_piece(const TeamSurface& surface, const std::string& path, bool with_header,
+               const Progress& progress) {
+    PlyPieces file(path, surface.vertices, surface.triangles);
+    if (with_header) file.put_header();
+    const Vec3f* points = surface.piece.points.data();
+    for (const SurfaceRun& run : surface.piece.point_runs) {
+        file.put_points(run.first, points, run.count);
+        points += run.count;
+        progress.report(0);
+    }
+    const Triangle* triangles = surface.piece.triangles.data();
+    for (const SurfaceRun& run : surface.piece.triangle_runs) {
+        file.put_triangles(run.first, triangles, run.count);
+        triangles += run.count;
+        progress.report(0.5);
+    }
+    file.close();
+}
+
+/// Every member puts what it has where it belongs in one file, which has its name when all of it is there.
+void write_by_team(const TeamSurface& surface, const std::string& out, Team& team, const Progress& progress) {
+    const std::string unfinished = out + ".unfinished";
+    const bool first = team.rank() == 0;
+    std::error_code error;
+    if (first) std::filesystem::remove(unfinished, error);
+    wait_for_all(team);
+    try {
+        run_together(team, [&] { put_piece(surface, unfinished, first, progress); });
+        run_together(team, [&] {
+            if (first) std::filesystem::rename(unfinished, out, error);
+            if (error) throw IoError(fmt::format("{}: cannot be written: {}", out, error.message()));
+        });
+    } catch (const std::exception&) {
+        if (first) std::filesystem::remove(unfinished, error);
+        throw;
+    }
+}
+
 /// Every member extracts the surface in its part and puts it where it belongs in the one file.
 void run_surface_by_team(const SurfaceOptions& o, Session& session) {
     const Isovalue rule = o.iso.parse();
@@ -148,31 +187,7 @@ void run_surface_by_team(const SurfaceOptions& o, Session& session) {
                         "{:.6g}; try another --iso",
                         o.in, iso, part.statistics.min, part.statistics.max));
     seconds["compute"] = clock.lap();
-    const Progress progress = session.stage("writing");
-    const std::string unfinished = o.out + ".unfinished";
-    std::error_code error;
-    if (team.rank() == 0) std::filesystem::remove(unfinished, error);
-    wait_for_all(team);
-    PlyPieces file(unfinished, surface.vertices, surface.triangles);
-    if (team.rank() == 0) file.put_header();
-    const Vec3f* points = surface.piece.points.data();
-    for (const SurfaceRun& run : surface.piece.point_runs) {
-        file.put_points(run.first, points, run.count);
-        points += run.count;
-    }
-    const Triangle* triangles = surface.piece.triangles.data();
-    for (const SurfaceRun& run : surface.piece.triangle_runs) {
-        file.put_triangles(run.first, triangles, run.count);
-        triangles += run.count;
-        progress.report(0.5);
-    }
-    file.close();
-    wait_for_all(team);
-    if (team.rank() == 0) {
-        std::filesystem::rename(unfinished, o.out, error);
-        if (error) throw IoError(fmt::format("{}: cannot be written: {}", o.out, error.message()));
-    }
-    wait_for_all(team);
+    write_by_team(surface, o.out, team, session.stage("writing"));
     session.end_stage();
     seconds["write"] = clock.lap();
     std::vector<std::uint64_t> sent{surface.bytes_sent};

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "apps/block_filter.h"
 #include "apps/command.h"
 #include "apps/flow_flags.h"
 #include "apps/map_filter.h"
@@ -26,6 +27,7 @@ void check_for_team(const DenoiseOptions& o, Session& session);
 struct DenoiseOptions {
     MapFilterFlags files;
     DiffusionFlags diffusion;
+    CheckpointFlags checkpoints;
     std::string method = "hyperdiffusion", spectra;
     std::string slices;  ///< beginning of the names of bare sections before and after
     PlotFlags plots;
@@ -68,6 +70,9 @@ void DenoiseOptions::finish(Session& session) {
         diffusion.orders = "0";
     }
     diffusion.finish();
+    if (!diffuses() && !checkpoints.options.folder.empty())
+        throw UsageError(fmt::format("--checkpoint means nothing to --method {}", method));
+    checkpoints.finish();
     if (session.team) check_for_team(*this, session);
 }
 
@@ -82,11 +87,8 @@ struct Outcome {
 
 std::string noise_text(double noise) { return fmt::format("{:.4g} (estimated standard deviation)", noise); }
 
-Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress,
-                const stencil::Share* share = nullptr) {
+Outcome outcome_of(const DenoiseOptions& o, const HyperdiffusionReport& r) {
     const HyperdiffusionOptions& options = o.diffusion.options;
-    const HyperdiffusionReport r =
-        naming(o.files.in, [&] { return hyperdiffuse(grid, options, progress, share); });
     std::vector<int> orders;
     std::vector<double> diffusivities;
     for (const DiffusionTerm& term : options.terms) {
@@ -115,6 +117,16 @@ Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progres
     out.history = fmt::format("{}, time {:.9g}{}, {} steps, dt {:.9g}, {}", settings, r.time,
                               r.automatic ? " (auto)" : "", r.steps, r.dt, name_of(options.stepper));
     return out;
+}
+
+Outcome diffuse(const DenoiseOptions& o, openvdb::FloatGrid& grid, const stencil::Share* share,
+                Session& session) {
+    return outcome_of(o, o.checkpoints.run(session, [&] {
+        return naming(o.files.in, [&] {
+            return hyperdiffuse(grid, o.diffusion.options, session.stage("denoising"), share,
+                                o.checkpoints.options);
+        });
+    }));
 }
 
 Outcome filter(const DenoiseOptions& o, openvdb::FloatGrid& grid, const Progress& progress) {
@@ -170,12 +182,61 @@ void check_for_team(const DenoiseOptions& o, Session& session) {
         if (!value.empty()) throw UsageError(fmt::format("{}: a team draws no pictures", flag));
 }
 
+void warn_unchanged(const DenoiseOptions& o, const Json& j, const Outcome& outcome, Session& session) {
+    if (j["automatic"] == true && outcome.removed == 0)
+        session.warn(o.files.in +
+                     ": no noise was found, and nothing was changed; --time tells how long to diffuse");
+}
+
+bool draws(const DenoiseOptions& o) {
+    return !o.files.preview.empty() || !o.spectra.empty() || !o.slices.empty();
+}
+
+/// A map that does not fit into memory.
+void run_denoise_in_blocks(const DenoiseOptions& o, Session& session) {
+    Json seconds;
+    Clock clock;
+    BlockFilter filter(o.files, session);
+    need_density(o.files.in, filter.in());
+    seconds["read"] = clock.lap();
+    HyperdiffusionReport report;
+    BlockOptions blocks = filter.options();
+    blocks.checkpoint = o.checkpoints.options;
+    const auto solver = o.checkpoints.run(session, [&] {
+        return naming(o.files.in, [&] {
+            return hyperdiffuse_blocks(filter.source(), o.diffusion.options, blocks, report,
+                                       session.stage("denoising"));
+        });
+    });
+    filter.need_solver(solver);
+    const Outcome outcome = outcome_of(o, report);
+    filter.finish(*solver, false, fmt::format("denoised: {}, {}", o.method, outcome.history),
+                  session.stage("statistics"));
+    seconds["compute"] = clock.lap();
+    Json j = filter_result(o.files, filter.in());
+    j["method"] = o.method;
+    j.update(outcome.numbers);
+    j["removed"] = outcome.removed;
+    j.update(statistics_json(filter.statistics()));
+    filter.write(j, session);
+    seconds["write"] = clock.lap();
+    o.checkpoints.remove(session);
+    j["seconds"] = seconds;
+    say_outcome(outcome, j, std::sqrt(solver->before().variance()), session);
+    warn_unchanged(o, j, outcome, session);
+    session.result(j);
+}
+
 void run_denoise(const DenoiseOptions& o, Session& session) {
     Json seconds;
     Clock clock;
     const double state = o.diffuses() ? 20.2 : 16.4;  // bytes a voxel: grid and fields
+    const MemoryNeed need{"denoising", state};
+    const bool blocks_will_do =
+        o.diffuses() && o.diffusion.options.stepper != Stepper::adi && !draws(o) && !session.team;
+    if (blocks_will_do && in_blocks(o.files, need)) return run_denoise_in_blocks(o, session);
     FilterInput input =
-        read_filter_input(o.files, {"denoising", state}, hyperdiffusion_halo(o.diffusion.options), session);
+        read_filter_input(o.files, need, hyperdiffusion_halo(o.diffusion.options), session);
     MapFile& in = input.in;
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
@@ -187,9 +248,8 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     const double rms_before = active_moments(*in.map.grid, input.counted()).statistics().rms;
     seconds["preview"] = clock.lap();
     openvdb::FloatGrid& grid = *in.map.grid;
-    const Progress progress = session.stage("denoising");
-    const Outcome outcome =
-        o.diffuses() ? diffuse(o, grid, progress, input.share()) : filter(o, grid, progress);
+    const Outcome outcome = o.diffuses() ? diffuse(o, grid, input.share(), session)
+                                         : filter(o, grid, session.stage("denoising"));
     finish_map(input, fmt::format("denoised: {}, {}", o.method, outcome.history));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, in);
@@ -202,6 +262,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     seconds["preview"] = seconds["preview"].get<double>() + clock.lap();
     write_filtered(o.files, input, outcome.bytes_sent, j, session);
     seconds["write"] = clock.lap();
+    o.checkpoints.remove(session);
     if (shown) {
         if (!o.files.preview.empty()) {
             preview.write(o.files.preview);
@@ -217,9 +278,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     if (!o.slices.empty()) j["slices"] = slices.write(o.slices);
     j["seconds"] = seconds;
     say_outcome(outcome, j, rms_before, session);
-    if (j["automatic"] == true && outcome.removed == 0)
-        session.warn(o.files.in +
-                     ": no noise was found, and nothing was changed; --time tells how long to diffuse");
+    warn_unchanged(o, j, outcome, session);
     session.result(j);
 }
 
@@ -255,6 +314,7 @@ Command denoise_command() {
             o->files.add(app,
                          "Map to write: .mrc .map .ccp4 .rec, .vdb or .nvdb; - is an MRC map for a pipe");
             o->files.add_preview(app, "Picture (PNG) of sections and power spectra before and after");
+            o->checkpoints.add(app);
             app.add_option("--spectra", o->spectra,
                            "Plot the radial power spectra before and after here (PNG or SVG)");
             o->plots.add(app);

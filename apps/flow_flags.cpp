@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "apps/flags.h"
+#include "vdbgeo/flow/checkpoint.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -293,6 +294,36 @@ void FlowFlags::finish() {
     }
 }
 
+void CheckpointFlags::add(CLI::App& app) {
+    app.add_option_function<std::string>(
+        "--checkpoint", [this](const std::string& text) { options.folder = text; },
+        "Folder for checkpoints, which a later run can go on from; SIGTERM and SIGUSR1 have one written, and "
+        "end the run");
+    app.add_option("--checkpoint-every", options.every, "Cycles between two checkpoints")
+        ->check(CLI::Range(1, 1000000).description(""))
+        ->capture_default_str();
+    app.add_flag("--resume", options.resume,
+                 "Go on from the newest checkpoint that is whole; from the beginning where there is none");
+}
+
+void CheckpointFlags::finish() {
+    if (options.folder.empty()) {
+        if (options.resume) throw UsageError("--resume needs --checkpoint DIR");
+        return;
+    }
+    options.stop = stop_handler();
+}
+
+void CheckpointFlags::remove(const Session& session) const {
+    if (options.folder.empty() || (session.team && session.team->rank() != 0)) return;
+    remove_checkpoints(options.folder);
+}
+
+void CheckpointFlags::say_stopped(Session& session) const {
+    if (options.stop && options.stop())
+        session.warn(options.folder.string() + ": a checkpoint is written; --resume goes on from it");
+}
+
 Json report_json(const HyperdiffusionReport& r) {
     return {{"dt", r.dt},
             {"steps", r.steps},
@@ -301,7 +332,9 @@ Json report_json(const HyperdiffusionReport& r) {
             {"active_voxels", r.active_voxels},
             {"mean_before", r.mean_before},
             {"mean_after", r.mean_after},
-            {"state_bytes", r.state_bytes}};
+            {"state_bytes", r.state_bytes},
+            {"blocks", r.blocks},
+            {"resumed_cycles", r.resumed_cycles}};
 }
 
 std::string steps_text(const HyperdiffusionReport& r) {

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "apps/session.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/checkpoint_options.h"
 #include "vdbgeo/flow/coupled_high_pass.h"
 #include "vdbgeo/flow/geometric_flow.h"
 #include "vdbgeo/flow/hyperdiffusion.h"
@@ -71,6 +73,29 @@ struct FlowFlags {
 
  private:
     std::vector<CLI::Option*> of_density_, of_surface_;
+};
+
+/// --checkpoint, --checkpoint-every, --resume
+struct CheckpointFlags {
+    CheckpointOptions options;
+    void add(CLI::App& app);
+    /// Makes SIGTERM and SIGUSR1 ask for a checkpoint and the end, where there are any; UsageError.
+    void finish();
+    /// Runs a computation; where it was stopped, says where its checkpoint is.
+    template <class Body>
+    auto run(Session& session, const Body& body) const -> decltype(body()) {
+        try {
+            return body();
+        } catch (const Cancelled&) {
+            say_stopped(session);
+            throw;
+        }
+    }
+    /// Once the result is written: nothing is left to resume. By one member of a team.
+    void remove(const Session& session) const;
+
+ private:
+    void say_stopped(Session& session) const;
 };
 
 /// What a diffusion did: active_voxels, dt, steps, time, mean_before, mean_after, state_bytes.

@@ -32,11 +32,21 @@ void check_memory(const MapFilterFlags& flags, const MemoryNeed& need, double vo
                         flags.map.options.memory ? " (--memory)" : ", half of the machine's", what_to_try));
 }
 
-/// Samples of a map file that will all be read: by its header alone. Nothing where that does not tell.
-std::optional<double> samples_to_come(const MapFilterFlags& flags) {
+/// Voxels in the leaves that have active ones, once tiles are leaves too.
+double voxels_in_leaves(const openvdb::FloatGrid& grid) {
+    double voxels = static_cast<double>(grid.constTree().leafCount()) * leaf::size;
+    auto tile = grid.constTree().cbeginValueOn();
+    tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) voxels += static_cast<double>(tile.getVoxelCount());
+    return voxels;
+}
+
+}  // namespace
+
+std::optional<double> samples_in_file(const MapFilterFlags& flags, bool all) {
     const MapReadOptions& o = flags.map.options;
     if (flags.in == "-" || is_vdb_file(flags.in)) return {};
-    if (o.threshold || o.sparsify.threshold || o.needs_selection()) return {};
+    if (!all && (o.threshold || o.sparsify.threshold || o.needs_selection())) return {};
     const Vec3i size = MrcReader(flags.in, o.mrc).frame().size;
     double samples = 1;
     for (int a = 0; a < 3; ++a) {
@@ -50,23 +60,14 @@ std::optional<double> samples_to_come(const MapFilterFlags& flags) {
     return samples;
 }
 
-/// Voxels in the leaves that have active ones, once tiles are leaves too.
-double voxels_in_leaves(const openvdb::FloatGrid& grid) {
-    double voxels = static_cast<double>(grid.constTree().leafCount()) * leaf::size;
-    auto tile = grid.constTree().cbeginValueOn();
-    tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) voxels += static_cast<double>(tile.getVoxelCount());
-    return voxels;
-}
-
-}  // namespace
-
 void MapFilterFlags::add(CLI::App& app, const std::string& out_text) {
     app.add_option("in", in, "Map (MRC, CCP4; - reads one from a pipe) or VDB grid")->required();
     app.add_option("out", out, out_text)->required();
     map.add_reading(app);
     map.add_sparsify(app);
     map.add_memory(app);
+    app.add_option("--scratch", map.options.scratch,
+                   "Folder for what does not fit into the memory, for as long as it takes [that of OUT]");
     add_vdb_flags(app, vdb);
     app.add_option("--mode", mrc.mode, "MRC mode to write: 0, 1, 2, 6, 12 or 101 [2]");
     add_map_output_flags(app, mrc);
@@ -85,7 +86,7 @@ void MapFilterFlags::finish() {
 
 MapFile read_for_filter(const MapFilterFlags& flags, const MemoryNeed& need, Session& session) {
     const char* fewer = "--bin 2, --crop or --threshold";
-    if (const auto samples = samples_to_come(flags)) check_memory(flags, need, *samples, fewer);
+    if (const auto samples = samples_in_file(flags, false)) check_memory(flags, need, *samples, fewer);
     MapFile in = read_map(flags.in, flags.map.options, session.stage("reading"));
     need_samples(flags.in, active_moments(*in.map.grid), in.map.statistics);
     check_memory(flags, need, voxels_in_leaves(*in.map.grid),

@@ -28,6 +28,10 @@ struct MapFilterFlags {
     void finish();
 };
 
+/// Samples of a map file, by its header alone. Nothing where that does not tell; where a threshold or a mask
+/// leaves some out, only if `all` are asked for.
+std::optional<double> samples_in_file(const MapFilterFlags& flags, bool all);
+
 /// What a command takes, in bytes a voxel of active leaves, the grid among it.
 struct MemoryNeed {
     std::string doing;  ///< "denoising"

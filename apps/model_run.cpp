@@ -14,7 +14,7 @@
 #include "apps/model_stages.h"
 #include "apps/reports.h"
 #include "apps/subcommand.h"
-#include "converters/file_hash.h"
+#include "vdbgeo/core/file_hash.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/view/render.h"

@@ -14,7 +14,7 @@
 namespace vdbgeo::app {
 namespace {
 
-volatile sig_atomic_t interrupted = 0;
+volatile sig_atomic_t interrupted = 0, stop_wanted = 0;
 
 void on_interrupt(int) {
     if (interrupted) _exit(130);  // a second Ctrl-C does not wait
@@ -156,13 +156,20 @@ std::string json_text(const Json& value, int indent) {
     return value.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
+std::function<bool()> stop_handler() {
+    struct sigaction action {};
+    action.sa_handler = [](int) { stop_wanted = 1; };
+    sigaction(SIGTERM, &action, nullptr);
+    sigaction(SIGUSR1, &action, nullptr);
+    return [] { return stop_wanted != 0; };
+}
+
 void install_interrupt_handler() {
     struct sigaction action {};
     action.sa_handler = on_interrupt;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
-    // mpirun and srun pass it on at once; on SIGTERM they kill.
-    sigaction(SIGUSR1, &action, nullptr);
+    sigaction(SIGUSR1, &action, nullptr);  // mpirun and srun pass it on at once; on SIGTERM they kill
     signal(SIGPIPE, SIG_IGN);  // a closed pipe is a write error, not a silent death
     signal(SIGXFSZ, SIG_IGN);  // so is a file that grew over its limit
 }

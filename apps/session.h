@@ -85,4 +85,7 @@ std::string json_text(const Json& value, int indent = -1);
 /// Ctrl-C sets a flag that every progress report looks at.
 void install_interrupt_handler();
 
+/// From now on SIGTERM and SIGUSR1 do not interrupt: they are asked for by what comes back.
+std::function<bool()> stop_handler();
+
 }  // namespace vdbgeo::app

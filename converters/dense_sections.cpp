@@ -42,6 +42,12 @@ std::size_t DenseSections::largest_piece() const {
 
 void DenseSections::fill(int section, float* out) const {
     const int begin = leaf_start(first_[order_[1]]), end = first_[order_[1]] + size_[order_[1]];
+    // Asked for here, outside of the loop, so that a source that reads by slabs reads on all threads.
+    openvdb::Coord corner;
+    corner[order_[0]] = leaf_start(first_[order_[0]]), corner[order_[1]] = begin;
+    corner[order_[2]] = leaf_start(first_[order_[2]] + section);
+    float tile = 0;
+    leaves_()(corner, tile);
     parallel_for(static_cast<std::size_t>((end - begin + leaf - 1) / leaf), 1, [&](std::size_t i) {
         fill_row_of_leaves(section, begin + leaf * static_cast<int>(i), out);
     });

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "converters/map_parts.h"
 #include "converters/map_passes.h"
 #include "converters/streamed_grid.h"
 #include "vdbgeo/core/errors.h"
@@ -37,9 +38,23 @@ MapFile read_mrc_map(const fs::path& path, const MapReadOptions& options, const 
     return result;
 }
 
-MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
+void naming_half(const fs::path& path, const RoundingError& error) {
+    try {
+        check_half_range(error);
+    } catch (const InvalidInput& e) {
+        throw InvalidInput(path.string() + ": " + e.what());
+    }
+}
+
+std::string lower_case(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+}  // namespace
+
+MapFile map_of_vdb(const openvdb::FloatGrid::Ptr& grid, const fs::path& path, const MapReadOptions& options) {
     MapFile result;
-    const auto grid = read_vdb(path, options.grid);
     if (const auto placement = placement_of(*grid)) {
         undo_placement(*grid);
         result.warnings.push_back(
@@ -63,21 +78,6 @@ MapFile read_vdb_map(const fs::path& path, const MapReadOptions& options) {
     return result;
 }
 
-void naming_half(const fs::path& path, const RoundingError& error) {
-    try {
-        check_half_range(error);
-    } catch (const InvalidInput& e) {
-        throw InvalidInput(path.string() + ": " + e.what());
-    }
-}
-
-std::string lower_case(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
-}  // namespace
-
 void finish_map_file(MapPasses& passes, MapFile& result) {
     result.warnings = passes.source().warnings();
     if (result.map.statistics.non_finite > 0)
@@ -91,8 +91,14 @@ void finish_map_file(MapPasses& passes, MapFile& result) {
 
 MapFile read_map(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
     options.check();
+    if (is_map_parts(path)) {
+        const MapParts parts(path);
+        const openvdb::FloatGrid::Ptr grid = parts.empty_grid();
+        parts.copy_to(openvdb::CoordBBox::inf(), grid->tree(), progress);
+        return map_of_vdb(grid, path, options);
+    }
     if (!is_vdb_file(path)) return read_mrc_map(path, options, progress);
-    MapFile result = read_vdb_map(path, options);
+    MapFile result = map_of_vdb(read_vdb(path, options.grid), path, options);
     progress.report(1);
     return result;
 }

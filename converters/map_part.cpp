@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "converters/map_passes.h"
+#include "converters/map_box.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/volume/grid_part.h"
 
@@ -61,45 +61,21 @@ class TotalsOfAll {
     std::vector<float> border_;
 };
 
-/// Rows of blocks from low to high along an axis of the file, as far as the map goes.
-std::pair<int, int> blocks_along(int axis, const CoordBBox& box, const Vec3i& size) {
-    const int begin = std::max(box.min()[axis], 0), end = std::min(box.max()[axis] + 1, size[axis]);
-    if (begin >= end) return {0, 0};
-    return {begin / leaf::dim, (end - 1) / leaf::dim + 1};
-}
-
 MapFile read_mrc_part(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
                       const Progress& progress) {
     MapPasses passes(path, options);
     const double before = 1 - 1.0 / passes.passes();
     passes.prepare(progress.part(0, before));
-    const Vec3i size = passes.sorter().size();
     const auto order = passes.sorter().order();
-    const auto [first_row, end_row] = blocks_along(order[1], part.wanted, size);
-    const auto [first_slab, end_slab] = blocks_along(order[2], part.wanted, size);
-    passes.source().restrict_to({first_row, end_row, first_slab, end_slab});
-    GridBuilder builder(size, order, passes.sparsify(), passes.keep());
+    GridBuilder builder(passes.sorter().size(), order, passes.sparsify(), passes.keep());
     TotalsOfAll totals;
-    int slab = first_slab, row = first_row;
-    const auto take = [&](std::vector<SortedStrip>&& strips) {
-        for (SortedStrip& strip : strips) {
-            Coord first;  // of the strip's first block
-            first[order[1]] = row * leaf::dim;
-            first[order[2]] = slab * leaf::dim;
-            if (part.own.isInside(first)) totals.add(slab, row, strip);
-            auto& blocks = strip.blocks;
-            blocks.erase(
-                std::remove_if(blocks.begin(), blocks.end(),
-                               [&](const SortedBlock& b) {
-                                   return !part.wanted.hasOverlap(CoordBBox::createCube(b.origin, leaf::dim));
-                               }),
-                blocks.end());
-            builder.add_blocks(std::move(blocks));
-            if (++row == end_row) row = first_row, ++slab;
-        }
+    const auto add_own = [&](int slab, int row, const SortedStrip& strip) {
+        Coord first;  // of the strip's first block
+        first[order[1]] = row * leaf::dim;
+        first[order[2]] = slab * leaf::dim;
+        if (part.own.isInside(first)) totals.add(slab, row, strip);
     };
-    if (first_row < end_row && first_slab < end_slab)
-        passes.sort([](SortedStrip&& strip) { return std::move(strip); }, take, progress.part(before, 1));
+    sort_box(passes, part.wanted, builder, add_own, progress.part(before, 1));
     MapTotals all = totals.gather(*part.team);
     MapFile result;
     result.rounding = all.rounding();

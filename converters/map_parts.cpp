@@ -10,6 +10,7 @@
 #include "converters/vdb_sections.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {
@@ -150,6 +151,36 @@ MapParts::MapParts(MapParts&&) noexcept = default;
 const Frame& MapParts::frame() const { return state_->parts[0].frame(); }
 std::uint64_t MapParts::active_voxels() const { return state_->active_voxels; }
 std::size_t MapParts::parts() const { return state_->parts.size(); }
+
+std::uint64_t MapParts::memory() const {
+    std::uint64_t bytes = 0;
+    for (const VdbSections& part : state_->parts) bytes += part.memory();
+    return bytes;
+}
+
+openvdb::FloatGrid::Ptr MapParts::empty_grid() const {
+    openvdb::FloatGrid::Ptr grid = state_->parts[0].empty_grid();
+    static_cast<openvdb::MetaMap&>(*grid) = state_->meta;
+    return grid;
+}
+
+std::vector<CoordBBox> MapParts::pieces() const {
+    std::vector<CoordBBox> all;
+    for (const VdbSections& part : state_->parts)
+        for (const CoordBBox& piece : part.pieces()) all.push_back(piece);
+    sort_pieces(all);
+    return all;
+}
+
+void MapParts::copy_to(const CoordBBox& box, openvdb::FloatTree& to, const Progress& progress) const {
+    const double count = static_cast<double>(parts());
+    for (std::size_t i = 0; i < parts(); ++i) {
+        CoordBBox inside = whole_leaves(box);
+        inside.intersect(state_->boxes[i]);
+        const double before = static_cast<double>(i) / count;
+        if (!inside.empty()) state_->parts[i].copy_to(inside, to, progress.part(before, before + 1 / count));
+    }
+}
 
 MrcWriteReport MapParts::write_mrc(const fs::path& path, const MrcWriteOptions& options,
                                    const Progress& progress) const {

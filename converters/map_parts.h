@@ -37,6 +37,13 @@ class MapParts {
     const Frame& frame() const;
     std::uint64_t active_voxels() const;
     std::size_t parts() const;
+    /// Bytes that the notes on all parts take.
+    std::uint64_t memory() const;
+
+    /// As those of VdbSections, for the whole.
+    openvdb::FloatGrid::Ptr empty_grid() const;
+    std::vector<openvdb::CoordBBox> pieces() const;
+    void copy_to(const openvdb::CoordBBox& box, openvdb::FloatTree& to, const Progress& progress = {}) const;
 
     /// Writes the whole as write_mrc does, to the same bytes: eight sections in memory.
     MrcWriteReport write_mrc(const std::filesystem::path& path, const MrcWriteOptions& options = {},

@@ -85,9 +85,10 @@ void MapPasses::store_metadata(openvdb::MetaMap& meta) const {
 std::vector<std::string> MapPasses::notes() const {
     std::vector<std::string> all;
     if (source_.unpacked() > 0)
-        all.push_back(fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
-                                  static_cast<double>(source_.unpacked()) / 1e6,
-                                  passes() > 1 ? fmt::format("{} times", passes()) : "in parts"));
+        all.push_back(
+            fmt::format("unpacked to a temporary file of {:.1f} MB, to be gone through {}",
+                        static_cast<double>(source_.unpacked()) / 1e6,
+                        passes() > 1 && last_ < in_parts ? fmt::format("{} times", passes()) : "in parts"));
     if (options_.despeckle > 1)
         all.push_back(fmt::format("{} voxels were in pieces of fewer than {}, and dropped", despeckled_,
                                   options_.despeckle));

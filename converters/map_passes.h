@@ -14,6 +14,9 @@ namespace vdbgeo {
 ///     passes.sort(take, progress);                         // the last
 class MapPasses {
  public:
+    /// So often are the samples wanted by who reads parts of them.
+    static constexpr int in_parts = 1 << 20;
+
     /// Errors as StripSource. `path` may be a pipe: see StripSource.
     /// `last`: how often the samples are wanted after prepare().
     MapPasses(const std::filesystem::path& path, const MapReadOptions& options, int last = 1);
@@ -38,6 +41,8 @@ class MapPasses {
     std::string history() const;
     std::uint64_t despeckled() const { return despeckled_; }
     int passes() const;
+    /// Those that prepare() makes.
+    int passes_before() const { return passes_before(options_); }
     /// What a grid has to remember of the file, as store_mrc_metadata; mode 2 once values became others.
     void store_metadata(openvdb::MetaMap& meta) const;
     /// What was done that the user may want to know, one line each.
@@ -67,6 +72,11 @@ class MapPasses {
 
 /// Warnings, notes and metadata of a map whose samples are sorted.
 void finish_map_file(MapPasses& passes, MapFile& result);
+
+/// A map of the grid in a VDB file, taken back to Å where it was placed for a program, with warnings of the
+/// options that do not apply to it. InvalidInput where its transform makes no frame.
+MapFile map_of_vdb(const openvdb::FloatGrid::Ptr& grid, const std::filesystem::path& path,
+                   const MapReadOptions& options);
 
 template <class Pack, class Take>
 void MapPasses::sort(const Pack& pack, const Take& take, const Progress& progress) {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "converters/scratch_file.h"
+#include "converters/byte_store.h"
 #include "converters/self_writing_grid.h"
 #include "vdbgeo/volume/rounding.h"
 #include "vdbgeo/volume/sparsify.h"

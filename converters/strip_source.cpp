@@ -12,9 +12,9 @@
 #include <future>
 
 #include "converters/mrc_layout.h"
-#include "converters/scratch_file.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/core/scratch_file.h"
 
 namespace vdbgeo {
 namespace {

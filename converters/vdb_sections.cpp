@@ -12,6 +12,8 @@
 #include "converters/vdb_byte_stream.h"
 #include "converters/vdb_checks.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/parallel.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 
@@ -194,6 +196,8 @@ struct VdbSections::State {
     }
 
     LeafLookup lookup() const;
+    /// Copies of the leaves in a box of one node.
+    std::vector<std::unique_ptr<Leaf>> leaves_in(const CoordBBox& box) const;
 
     MappedFile file;
     VdbCursor cursor;
@@ -286,10 +290,81 @@ LeafLookup VdbSections::State::lookup() const {
     };
 }
 
+std::vector<std::unique_ptr<Leaf>> VdbSections::State::leaves_in(const CoordBBox& box) const {
+    LeafReader reader(file, skeleton, *owner, *notes, *grid);
+    std::vector<std::unique_ptr<Leaf>> leaves;
+    Coord at;
+    float tile = 0;
+    for (at.x() = box.min().x(); at.x() <= box.max().x(); at.x() += Leaf::DIM)
+        for (at.y() = box.min().y(); at.y() <= box.max().y(); at.y() += Leaf::DIM)
+            for (at.z() = box.min().z(); at.z() <= box.max().z(); at.z() += Leaf::DIM)
+                if (const Leaf* leaf = reader(at, tile)) leaves.push_back(std::make_unique<Leaf>(*leaf));
+    return leaves;
+}
+
 VdbSections::Leaves VdbSections::leaf_reader() const {
     const State& s = *state_;
     const auto reader = std::make_shared<LeafReader>(s.file, s.skeleton, *s.owner, *s.notes, *s.grid);
     return [reader](const Coord& corner, float& tile) { return (*reader)(corner, tile); };
+}
+
+FloatGrid::Ptr VdbSections::empty_grid() const {
+    const FloatGrid& grid = *state_->grid;
+    FloatGrid::Ptr empty = grid.copyWithNewTree();
+    // Shared: a copy of a transform rounds its scale.
+    empty->setTransform(std::const_pointer_cast<openvdb::math::Transform>(grid.constTransformPtr()));
+    return empty;
+}
+
+void sort_pieces(std::vector<CoordBBox>& pieces) {
+    const auto before = [](const CoordBBox& a, const CoordBBox& b) {
+        constexpr int inside = UpperNode::DIM - 1;
+        return std::pair(a.min() & ~inside, a.min()) < std::pair(b.min() & ~inside, b.min());
+    };
+    std::sort(pieces.begin(), pieces.end(), before);
+    pieces.erase(std::unique(pieces.begin(), pieces.end()), pieces.end());
+}
+
+std::vector<CoordBBox> VdbSections::pieces() const {
+    const FloatTree& tiles = state_->grid->tree();
+    std::vector<CoordBBox> all;
+    for (const auto& [origin, run] : state_->notes->run_at)
+        all.push_back(CoordBBox::createCube(origin, LowerNode::DIM));
+    std::vector<const LowerNode*> lower;
+    tiles.getNodes(lower);
+    for (const LowerNode* node : lower) all.push_back(node->getNodeBoundingBox());
+    auto tile = tiles.cbeginValueAll();
+    tile.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 2);
+    for (; tile; ++tile)
+        if (tile.isValueOn() || *tile != tiles.background()) all.push_back(tile.getBoundingBox());
+    sort_pieces(all);
+    return all;
+}
+
+void VdbSections::copy_to(const CoordBBox& box, FloatTree& to, const Progress& progress) const {
+    const State& s = *state_;
+    const CoordBBox wanted = whole_leaves(box);
+    std::vector<CoordBBox> slices;  // of nodes, eight voxels thick
+    for (const auto& [origin, run] : s.notes->run_at) {
+        CoordBBox inside = CoordBBox::createCube(origin, LowerNode::DIM);
+        inside.intersect(wanted);
+        if (inside.empty()) continue;
+        for (int x = inside.min().x(); x <= inside.max().x(); x += Leaf::DIM) {
+            slices.push_back(inside);
+            slices.back().min().x() = x;
+            slices.back().max().x() = x + Leaf::DIM - 1;
+        }
+    }
+    constexpr std::size_t together = 64;
+    std::vector<std::vector<std::unique_ptr<Leaf>>> found(together);
+    for (std::size_t first = 0; first < slices.size(); first += together) {
+        const std::size_t count = std::min(together, slices.size() - first);
+        parallel_for(count, 1, [&](std::size_t i) { found[i] = s.leaves_in(slices[first + i]); });
+        for (std::size_t i = 0; i < count; ++i)
+            for (auto& leaf : found[i]) to.addLeaf(leaf.release());
+        progress.report(static_cast<double>(first + count) / static_cast<double>(slices.size()));
+    }
+    copy_tiles(s.grid->tree(), box, to);
 }
 
 VdbSections::VdbSections(const std::filesystem::path& path, const std::optional<std::string>& grid) {

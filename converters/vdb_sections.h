@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "converters/dense_sections.h"
 #include "converters/mrc.h"
@@ -45,10 +46,22 @@ class VdbSections {
     using Leaves = std::function<const leaf::Leaf*(const openvdb::Coord& corner, float& tile)>;
     Leaves leaf_reader() const;
 
+    /// The grid's name, metadata, transform and background, for a tree that has yet to come.
+    openvdb::FloatGrid::Ptr empty_grid() const;
+    /// Where its leaves and tiles lie, in the order of the tree: nodes of 128³ voxels, and larger tiles that
+    /// are active or differ from the background.
+    std::vector<openvdb::CoordBBox> pieces() const;
+    /// Adds the leaves and tiles that touch the box to a tree with the background of the grid; leaves are
+    /// decoded on all threads.
+    void copy_to(const openvdb::CoordBBox& box, openvdb::FloatTree& to, const Progress& progress = {}) const;
+
  private:
     struct State;
     std::unique_ptr<State> state_;
 };
+
+/// Sorts pieces of several grids into the order of a tree, each once.
+void sort_pieces(std::vector<openvdb::CoordBBox>& pieces);
 
 /// Writes the grid as write_mrc does, to the same bytes, with eight sections in memory.
 MrcWriteReport write_mrc(const VdbSections& grid, const std::filesystem::path& path,

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <string>
 
-#include "tests/support/grids.h"
+#include "tests/blocks/noisy_map.h"
 #include "tests/support/thread_team.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
@@ -19,56 +19,12 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 
-const CoordBBox whole(Coord(-20, -40, -60), Coord(90, 110, 200));
-
-/// A dense ball in noise, with a hole where nothing is active and sparse leaves around it.
-FloatGrid::Ptr noisy_map() {
-    test::SparseMaker make(7);
-    auto grid = make.grid();
-    auto to = grid->getAccessor();
-    for (auto c = whole.begin(); c; ++c) {
-        const Coord at = *c;
-        const Vec3d p(at.x() - 30, at.y() - 35, 0.6 * (at.z() - 70));
-        const double r = p.norm();
-        if (r > 75 || (r < 12 && at.x() > 30)) continue;
-        if (r > 68 && make.uniform() < 0.5) continue;
-        to.setValueOn(at, static_cast<float>((r < 45 ? 1 : 0) + make.uniform() - 0.5 + 10));
-    }
-    return grid;
-}
-
-struct Setting {
-    const char* name;
-    HyperdiffusionOptions options;
-};
-
-std::vector<Setting> settings() {
-    const auto with = [](int order, const std::string& sigma) {
-        HyperdiffusionOptions o;
-        o.terms = {{order, 1.0}};
-        o.sigma = EdgeScale::parse(sigma);
-        o.steps = order == 0 ? 40 : 22;
-        return o;
-    };
-    std::vector<Setting> all{{"q0 local", with(0, "local")},      {"q0 global", with(0, "global")},
-                             {"q1 local:3", with(1, "local:3")},  {"q1 global", with(1, "global")},
-                             {"q2 local:8", with(2, "local:8")},  {"q2 inf", with(2, "inf")},
-                             {"q1 until done", with(1, "global")}};
-    all.back().options.steps.reset();
-    all.push_back({"q0+q1 euler, fidelity", with(1, "local")});
-    all.back().options.terms = {{0, 0.5}, {1, 1.0}};
-    all.back().options.stepper = Stepper::euler;
-    all.back().options.steps = 7;
-    all.back().options.fidelity = 0.1;
-    return all;
-}
-
 class TeamHyperdiffusion : public ::testing::TestWithParam<std::pair<int, int>> {};
 
 TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
-    static const FloatGrid::Ptr input = noisy_map();
-    const auto boxes = partition(whole, GetParam());
-    for (const Setting& setting : settings()) {
+    static const FloatGrid::Ptr input = test::noisy_map();
+    const auto boxes = partition(test::noisy_box, GetParam());
+    for (const test::DiffusionSetting& setting : test::diffusion_settings()) {
         SCOPED_TRACE(setting.name);
         static std::map<std::string, std::pair<FloatGrid::Ptr, HyperdiffusionReport>> in_one;
         auto& [expected, alone] = in_one[setting.name];
@@ -109,13 +65,13 @@ INSTANTIATE_TEST_SUITE_P(Shares, TeamHyperdiffusion,
 
 /// Bytes of an exchange: those of the own leaves in the halos of others, for each field.
 TEST(TeamHyperdiffusionTraffic, IsWhatTheHalosHold) {
-    const FloatGrid::Ptr input = noisy_map();
+    const FloatGrid::Ptr input = test::noisy_map();
     HyperdiffusionOptions o;
     o.terms = {{1, 1.0}};
     o.steps = 20;
     o.min_cycles = 1;
     o.cycle = 20;
-    const auto boxes = partition(whole, {3, 1});
+    const auto boxes = partition(test::noisy_box, {3, 1});
     std::mutex mutex;
     test::ThreadTeam(3).run([&](Team& team) {
         const stencil::Share share{&team, boxes, hyperdiffusion_halo(o)};
@@ -134,8 +90,8 @@ TEST(TeamHyperdiffusionTraffic, IsWhatTheHalosHold) {
 }
 
 TEST(TeamHyperdiffusionErrors, AreToldByAll) {
-    const FloatGrid::Ptr input = noisy_map();
-    const auto boxes = partition(whole, {2, 1});
+    const FloatGrid::Ptr input = test::noisy_map();
+    const auto boxes = partition(test::noisy_box, {2, 1});
     HyperdiffusionOptions o;
     o.steps = 3;
     const auto run = [&](int halo, const HyperdiffusionOptions& options, const FloatGrid& grid) {

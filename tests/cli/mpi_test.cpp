@@ -75,6 +75,12 @@ TEST_F(Mpi, LeavesPartsThatMerge) {
     good({"merge", at("many.parts"), at("many.mrc"), "--quiet"});
     good({"convert", at("one.vdb"), at("one.mrc"), "--quiet"});
     EXPECT_TRUE(bytes("many.mrc") == bytes("one.mrc"));
+    // As an input it is read block by block.
+    good({"denoise", at("one.vdb"), at("one2.vdb"), "--order", "0", "--steps", "9", "--quiet"});
+    good({"denoise", at("many.parts"), at("many2.vdb"), "--order", "0", "--steps", "9", "--quiet"});
+    good({"convert", at("one2.vdb"), at("one2.mrc"), "--quiet"});
+    good({"convert", at("many2.vdb"), at("many2.mrc"), "--quiet"});
+    EXPECT_TRUE(bytes("many2.mrc") == bytes("one2.mrc"));
     // What else is in the folder stays.
     make("many.parts/mine.txt", "mine");
     EXPECT_EQ(mpi(2, parts).code, 0);

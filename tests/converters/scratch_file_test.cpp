@@ -1,5 +1,5 @@
 // Bytes held in memory, on the disk, or across both.
-#include "converters/scratch_file.h"
+#include "converters/byte_store.h"
 
 #include <gtest/gtest.h>
 

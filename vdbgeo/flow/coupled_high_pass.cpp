@@ -1,8 +1,11 @@
 #include "vdbgeo/flow/coupled_high_pass.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/checkpoint.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 
 namespace vdbgeo {
@@ -26,26 +29,46 @@ void HighPassOptions::check() const {
     require(!cycle || (*cycle >= 1 && *cycle <= 300), "a cycle has 1 to 300 steps");
 }
 
+std::string HighPassOptions::text() const {
+    std::string out =
+        fmt::format("high pass order {} {:a} {:a} coupling {:a} {:a} sigma {} {:a} {:a} {} time {:a} stepper {}",
+                    order, slow, fast, coupling_u, coupling_v, static_cast<int>(sigma.kind), sigma.value,
+                    sigma.factor, sigma.radius, time, static_cast<int>(stepper));
+    if (dt) out += fmt::format(" dt {:a}", *dt);
+    if (cycle) out += fmt::format(" cycle {}", *cycle);
+    return out;
+}
+
 int high_pass_halo(const HighPassOptions& options) {
     return diffusion_halo({{options.order, options.slow}}, options.sigma);
 }
 
+std::vector<DiffusionProblem::Field> high_pass_fields(const HighPassOptions& options) {
+    return {{{{options.order, options.slow}}, options.coupling_u},
+            {{{options.order, options.fast}}, options.coupling_v}};
+}
+
+void take_high_pass_cycles(CycleSolver& solver, const HighPassOptions& options, double step,
+                           HyperdiffusionReport& report, const Progress& progress) {
+    solver.run(options.stepper,
+               cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),
+               report, progress);
+}
+
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options,
-                                       const Progress& progress, const stencil::Share* share) {
+                                       const Progress& progress, const stencil::Share* share,
+                                       const CheckpointOptions& checkpoint) {
     options.check();
     check_halo(share, high_pass_halo(options));
     HyperdiffusionReport report;
     if (grid.tree().hasActiveTiles()) grid.tree().voxelizeActiveTiles();
     if (!share && grid.activeVoxelCount() == 0) return report;
-    DiffusionSolver solver(grid,
-                           {{{{options.order, options.slow}}, options.coupling_u},
-                            {{{options.order, options.fast}}, options.coupling_v}},
-                           options.sigma, share);
+    DiffusionSolver solver(grid, high_pass_fields(options), options.sigma, share);
     if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
-    solver.run(options.stepper,
-               cycles_for_time(options.stepper, options.time, step, {options.order, options.cycle, 3}),
-               report, progress);
+    report.resumed_cycles =
+        with_checkpoints(solver, checkpoint, options.text(), share ? share->team : nullptr,
+                         [&](CycleSolver& s) { take_high_pass_cycles(s, options, step, report, progress); });
     solver.describe(report);
     solver.store(grid);
     return report;

@@ -1,6 +1,10 @@
 // Edges as the difference of two coupled diffusions (Feng, Xia, Tong, Wei 2012, Eqs 6–8).
 #pragma once
 
+#include <vector>
+
+#include "vdbgeo/flow/cycles.h"
+#include "vdbgeo/flow/diffusion_fields.h"
 #include "vdbgeo/flow/hyperdiffusion.h"
 
 namespace vdbgeo {
@@ -18,6 +22,8 @@ struct HighPassOptions {
     std::optional<int> cycle;  ///< steps in a cycle of frozen coefficients, 1…300; unset: they grow
 
     void check() const;
+    /// All of them, exactly, in one line: what a checkpoint has to agree with.
+    std::string text() const;
 };
 
 /// u_t = F1(u) + ε_u (v − u), v_t = F2(v) + ε_v (u − v), u = v = X at 0; the grid's active values become the
@@ -25,10 +31,17 @@ struct HighPassOptions {
 /// 2 / (d_20 λ^{q+1} + ε_u + ε_v). Neutral: d_10 = d_20 gives 0 everywhere, and so does a constant.
 /// Errors as hyperdiffuse. Memory: 24 to 28 bytes a voxel of active leaves.
 /// `share`: as for hyperdiffuse, with the halo that high_pass_halo tells.
+/// `checkpoint`: CheckpointedSolver tells more.
 HyperdiffusionReport coupled_high_pass(openvdb::FloatGrid& grid, const HighPassOptions& options = {},
-                                       const Progress& progress = {}, const stencil::Share* share = nullptr);
+                                       const Progress& progress = {}, const stencil::Share* share = nullptr,
+                                       const CheckpointOptions& checkpoint = {});
 
 /// Voxels that a part needs around its own.
 int high_pass_halo(const HighPassOptions& options);
+
+/// u and v, for a solver, and the cycles that it takes.
+std::vector<DiffusionProblem::Field> high_pass_fields(const HighPassOptions& options);
+void take_high_pass_cycles(CycleSolver& solver, const HighPassOptions& options, double step,
+                           HyperdiffusionReport& report, const Progress& progress);
 
 }  // namespace vdbgeo

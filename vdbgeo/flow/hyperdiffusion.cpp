@@ -8,6 +8,8 @@
 #include <set>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/flow/checkpoint.h"
+#include "vdbgeo/flow/cycles.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/noise.h"
 #include "vdbgeo/volume/density_map.h"
@@ -18,107 +20,6 @@ namespace {
 void require(bool holds, const std::string& message) {
     if (!holds) throw InvalidInput(message);
 }
-
-int highest_order(const HyperdiffusionOptions& o) {
-    int q = 0;
-    for (const DiffusionTerm& t : o.terms) q = std::max(q, t.order);
-    return q;
-}
-
-/// What the options ask for, given the largest step.
-std::vector<CycleRun> plan_of(const HyperdiffusionOptions& o, double largest) {
-    if (o.time)
-        return cycles_for_time(o.stepper, *o.time, largest, {highest_order(o), o.cycle, o.min_cycles});
-    if (o.stepper != Stepper::fsi) return {{*o.steps, 1, largest}};
-    std::vector<CycleRun> plan;
-    const int longest = o.cycle.value_or(20),
-              cycles = std::max(o.min_cycles, (*o.steps + longest - 1) / longest);
-    for (int c = 0, done = 0; c < cycles; ++c) {
-        const int end = static_cast<int>(static_cast<std::int64_t>(*o.steps) * (c + 1) / cycles);
-        if (end > done) plan.push_back({1, end - done, largest});
-        done = end;
-    }
-    return plan;
-}
-
-/// Takes growing cycles until what was removed reaches the noise (discrepancy principle), or a limit of
-/// steps. Where the last cycle went beyond, all is done once more up to the time between.
-class UntilNoiseIsGone {
- public:
-    UntilNoiseIsGone(DiffusionSolver& solver, const HyperdiffusionOptions& o, double largest, double noise)
-        : solver_(solver),
-          options_(o),
-          largest_(largest),
-          noise_(noise),
-          most_steps_(solver.active_voxels() > large ? 150 : 320) {}
-
-    void run(HyperdiffusionReport& report, const Progress& progress) {
-        int n = next_cycle(0);
-        double time = 0, removed = 0;
-        for (int k = 0; cycles_.empty() || report.steps + n <= most_steps_; ++k) {
-            take({1, n, largest_}, report, progress);
-            const double now = solver_.removed();
-            // The first cycle turns the finest noise over a little: that it removes more than there is says
-            // nothing.
-            if (now >= noise_ * (k == 0 ? 1 + turned : 1)) {
-                if (removed > noise_)  // the first cycle had been too long after all
-                    go_back(0, 0, time, removed, report, progress);
-                else if (now > (1 + tolerance) * noise_)
-                    go_back(time, removed, report.time, now, report, progress);
-                return;
-            }
-            time = report.time;
-            removed = now;
-            n = next_cycle(k + 1);
-        }
-    }
-
- private:
-    /// Beyond this many voxels patience counts more than the last tenth of a dB.
-    static constexpr std::uint64_t large = 64000000;
-    static constexpr double tolerance = 0.01, turned = 0.1;
-
-    int next_cycle(int k) const {
-        const int n = growing_cycle(highest_order(options_), k);
-        return options_.cycle ? std::min(*options_.cycle, n) : n;
-    }
-    void take(const CycleRun& cycle, HyperdiffusionReport& report, const Progress& progress) {
-        cycles_.push_back(cycle);
-        solver_.run(Stepper::fsi, std::vector<CycleRun>{cycle}, report,
-                    progress.part(std::min(1.0, report.steps / double(most_steps_)),
-                                  std::min(1.0, (report.steps + cycle.n) / double(most_steps_))));
-    }
-
-    /// Once more, to where `noise_` is removed, given what was by two times: that goes about with the
-    /// logarithm of the time; from nothing on, with its square root.
-    void go_back(double time, double removed, double later, double removed_later,
-                 HyperdiffusionReport& report, const Progress& progress) {
-        const double share = (noise_ - removed) / (removed_later - removed);
-        const double until = time > 0 ? time * std::pow(later / time, share) : later * share * share;
-        std::vector<CycleRun> again;
-        double all = 0;
-        for (const CycleRun& c : cycles_) {
-            const double more = cycle_time(Stepper::fsi, c.n, c.tau);
-            if (all + more > time * (1 + 1e-9)) break;
-            all += more;
-            again.push_back(c);
-        }
-        const int least = again.empty() ? options_.min_cycles : 1;
-        const CycleRule rule{highest_order(options_), options_.cycle.value_or(300), least};
-        for (const CycleRun& c : cycles_for_time(Stepper::fsi, until - all, largest_, rule))
-            again.push_back(c);
-        report.steps = report.cycles = 0;
-        report.time = 0;
-        solver_.reset();
-        solver_.run(Stepper::fsi, again, report, progress);
-    }
-
-    DiffusionSolver& solver_;
-    const HyperdiffusionOptions& options_;
-    double largest_, noise_;
-    int most_steps_;
-    std::vector<CycleRun> cycles_;
-};
 
 }  // namespace
 
@@ -192,6 +93,18 @@ double HyperdiffusionOptions::largest_rate(const Vec3d& weights) const {
     return rate;
 }
 
+std::string HyperdiffusionOptions::text() const {
+    std::string out = fmt::format("hyperdiffusion sigma {} {:a} {:a} {}", static_cast<int>(sigma.kind),
+                                  sigma.value, sigma.factor, sigma.radius);
+    for (const DiffusionTerm& t : terms) out += fmt::format(" term {} {:a}", t.order, t.diffusivity);
+    out += fmt::format(" stepper {} cycles {} fidelity {:a}", static_cast<int>(stepper), min_cycles, fidelity);
+    if (time) out += fmt::format(" time {:a}", *time);
+    if (steps) out += fmt::format(" steps {}", *steps);
+    if (dt) out += fmt::format(" dt {:a}", *dt);
+    if (cycle) out += fmt::format(" cycle {}", *cycle);
+    return out;
+}
+
 Vec3d axis_weights(const openvdb::math::Transform& transform) {
     const Vec3d h = frame_of(transform).voxel_size();
     Vec3d w;
@@ -206,7 +119,8 @@ int hyperdiffusion_halo(const HyperdiffusionOptions& options) {
 }
 
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options,
-                                  const Progress& progress, const stencil::Share* share) {
+                                  const Progress& progress, const stencil::Share* share,
+                                  const CheckpointOptions& checkpoint) {
     options.check();
     check_halo(share, hyperdiffusion_halo(options));
     HyperdiffusionReport report;
@@ -217,10 +131,9 @@ HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const Hyperdiffusion
     DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma, share);
     if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
-    if (!report.automatic)
-        solver.run(options.stepper, plan_of(options, step), report, progress);
-    else if (report.noise > 0)
-        UntilNoiseIsGone(solver, options, step, report.noise).run(report, progress);
+    report.resumed_cycles =
+        with_checkpoints(solver, checkpoint, options.text(), share ? share->team : nullptr,
+                         [&](CycleSolver& s) { take_cycles(s, options, step, report.noise, report, progress); });
     solver.describe(report);
     if (report.steps) solver.store(grid);
     return report;

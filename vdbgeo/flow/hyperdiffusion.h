@@ -10,6 +10,7 @@
 
 #include "vdbgeo/core/progress.h"
 #include "vdbgeo/core/types.h"
+#include "vdbgeo/flow/checkpoint_options.h"
 #include "vdbgeo/stencil/share.h"
 
 namespace vdbgeo {
@@ -61,6 +62,8 @@ struct HyperdiffusionOptions {
     /// Σ d_q0 λ^{q+1} + β with λ = 4 Σ w_a, the largest rate of decay; explicit steps are stable up to 2 over
     /// it.
     double largest_rate(const Vec3d& weights) const;
+    /// All of them, exactly, in one line: what a checkpoint has to agree with.
+    std::string text() const;
 };
 
 struct HyperdiffusionReport {
@@ -73,6 +76,8 @@ struct HyperdiffusionReport {
     bool automatic = false;        ///< the time was chosen here
     std::size_t state_bytes = 0;   ///< memory of fields and tables beside the grid
     std::uint64_t bytes_sent = 0;  ///< to other members of the team
+    int resumed_cycles = 0;        ///< cycles that were taken before, by a run that left a checkpoint
+    std::size_t blocks = 0;        ///< that the map was cut into; 0: none
 };
 
 /// w_a = (h_min / h_a)² of the axes of a grid's transform: 1 for cubic voxels.
@@ -90,8 +95,11 @@ Vec3d axis_weights(const openvdb::math::Transform& transform);
 /// `share`: the grid is one member's part of a larger one, with the halo that hyperdiffusion_halo tells; all
 /// members call this with the same options. The own voxels then get the bits that they would get in one grid
 /// of all parts; ghosts are left as they were. Not with Stepper::adi.
+///
+/// `checkpoint`: CheckpointedSolver tells more.
 HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const HyperdiffusionOptions& options = {},
-                                  const Progress& progress = {}, const stencil::Share* share = nullptr);
+                                  const Progress& progress = {}, const stencil::Share* share = nullptr,
+                                  const CheckpointOptions& checkpoint = {});
 
 /// Voxels that a part needs around its own.
 int hyperdiffusion_halo(const HyperdiffusionOptions& options);

@@ -37,12 +37,19 @@ std::size_t band_of(const Tile& t, int spacing, float* out) {
     return n;
 }
 
-double noise_of(const openvdb::FloatTree& tree, int spacing, const stencil::Share* share) {
+/// One cell of so many is looked at.
+std::size_t sampled_of(std::uint64_t active_voxels) {
+    constexpr std::size_t sample = 8000000;
+    return std::max<std::size_t>(1, active_voxels / sample);
+}
+
+/// `active_voxels`: of the whole map, where the tree has its sample alone.
+double noise_of(const openvdb::FloatTree& tree, int spacing, const stencil::Share* share,
+                std::uint64_t active_voxels = 0) {
     constexpr double to_deviation = 1.4826;  // of a median absolute value, for a normal distribution
     constexpr double stencil_norm = 42;      // 6² + 6 · 1²
     constexpr std::size_t cell =
         std::size_t(1) * BlockLayout::size_x * BlockLayout::size_y * BlockLayout::size_z;
-    constexpr std::size_t sample = 8000000;
     Team* const team = share ? share->team : nullptr;
     const BlockLayout layout(tree, share ? std::optional(share->own()) : std::nullopt);
     std::vector<std::uint64_t> active{layout.active_count()};
@@ -50,7 +57,7 @@ double noise_of(const openvdb::FloatTree& tree, int spacing, const stencil::Shar
     BlockField field(layout.brick_count());
     stencil::load(layout, tree, 0, field.brick(0));
     stencil::TileFields fields{{field.brick(0)}, {}, spacing, 0};
-    fields.every = std::max<std::size_t>(1, active[0] / sample);
+    fields.every = sampled_of(active_voxels ? active_voxels : active[0]);
     OrderStatistic median(0.5);
     while (!median.done()) {
         stencil::for_each_tile(layout, fields, [&](Tile& t) {
@@ -73,10 +80,27 @@ double estimate_noise(const openvdb::FloatGrid& grid, int spacing, const stencil
     return noise_of(leaves, spacing, share);
 }
 
-double removable_noise(const openvdb::FloatGrid& grid, const stencil::Share* share) {
+namespace {
+
+template <class Estimate>
+double removable(const Estimate& estimate) {
     constexpr double flat = 1.3;
-    const double near = estimate_noise(grid, 2, share);
-    return near > 0 && estimate_noise(grid, 4, share) <= flat * near ? near : estimate_noise(grid, 1, share);
+    const double near = estimate(2);
+    return near > 0 && estimate(4) <= flat * near ? near : estimate(1);
+}
+
+}  // namespace
+
+double removable_noise(const openvdb::FloatGrid& grid, const stencil::Share* share) {
+    return removable([&](int spacing) { return estimate_noise(grid, spacing, share); });
+}
+
+double removable_noise_of_sample(const openvdb::FloatGrid& sample, std::uint64_t active_voxels) {
+    return removable([&](int spacing) { return noise_of(sample.tree(), spacing, nullptr, active_voxels); });
+}
+
+bool in_noise_sample(const openvdb::Coord& cell, std::uint64_t active_voxels) {
+    return stencil::in_sample(cell, sampled_of(active_voxels));
 }
 
 }  // namespace vdbgeo

@@ -3,6 +3,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <cstdint>
+
 #include "vdbgeo/stencil/share.h"
 
 namespace vdbgeo {
@@ -20,5 +22,10 @@ double estimate_noise(const openvdb::FloatGrid& grid, int spacing = 1, const ste
 /// no more than 1.3 times as much; that is so for noise, white or correlated over a few voxels as in maps
 /// that were resampled or filtered. Structure differs ever more with the distance: where it shows, spacing 1.
 double removable_noise(const openvdb::FloatGrid& grid, const stencil::Share* share = nullptr);
+
+/// The same of a map of so many active voxels, from its sample alone: `sample` has the leaves of the cells of
+/// 32 × 32 × 128 voxels for which in_noise_sample, given their first voxel, is true, and all around them.
+double removable_noise_of_sample(const openvdb::FloatGrid& sample, std::uint64_t active_voxels);
+bool in_noise_sample(const openvdb::Coord& cell, std::uint64_t active_voxels);
 
 }  // namespace vdbgeo

@@ -9,8 +9,8 @@
 #include <new>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/file_hash.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo::stencil {
@@ -41,36 +41,70 @@ double FieldSummary::variance() const {
     return std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m);
 }
 
-FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team) {
-    FieldSummary start;
-    start.min = std::numeric_limits<float>::infinity();
-    start.max = -start.min;
-    const auto part = [&](std::size_t i, FieldSummary& s) {
-        const float* v = bricks + i * BlockField::brick_size;
-        for (std::size_t x = 0; x < 8; ++x)
-            for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
-                const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
-                if (!std::isfinite(value)) {
-                    ++s.non_finite;
-                    continue;
-                }
-                ++s.count;
-                s.sum += value;
-                s.sum_of_squares += static_cast<double>(value) * value;
-                s.min = std::min(s.min, value);
-                s.max = std::max(s.max, value);
-            }
-    };
-    FieldSummary total = sum_bricks(layout, team, start, part, [](FieldSummary& a, const FieldSummary& b) {
-        a.sum += b.sum;
-        a.sum_of_squares += b.sum_of_squares;
-        a.min = std::min(a.min, b.min);
-        a.max = std::max(a.max, b.max);
-        a.count += b.count;
-        a.non_finite += b.non_finite;
-    });
+namespace {
+
+FieldSummary nothing_yet() {
+    FieldSummary s;
+    s.min = std::numeric_limits<float>::infinity();
+    s.max = -s.min;
+    return s;
+}
+
+void join_summaries(FieldSummary& a, const FieldSummary& b) {
+    a.sum += b.sum;
+    a.sum_of_squares += b.sum_of_squares;
+    a.min = std::min(a.min, b.min);
+    a.max = std::max(a.max, b.max);
+    a.count += b.count;
+    a.non_finite += b.non_finite;
+}
+
+}  // namespace
+
+FieldTotal::FieldTotal() : total_(nothing_yet(), join_summaries) {}
+
+void FieldTotal::add(const BlockLayout& layout, const float* bricks) {
+    total_.add(layout, sum_by_cell(layout, nothing_yet(), [&](std::size_t i, FieldSummary& s) {
+                   const float* v = bricks + i * BlockField::brick_size;
+                   for (std::size_t x = 0; x < 8; ++x)
+                       for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
+                           const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
+                           if (!std::isfinite(value)) {
+                               ++s.non_finite;
+                               continue;
+                           }
+                           ++s.count;
+                           s.sum += value;
+                           s.sum_of_squares += static_cast<double>(value) * value;
+                           s.min = std::min(s.min, value);
+                           s.max = std::max(s.max, value);
+                       }
+               }));
+}
+
+FieldSummary FieldTotal::summary(Team* team) const {
+    FieldSummary total = total_.total(team);
     if (total.count == 0) total.min = total.max = 0;
     return total;
+}
+
+FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team) {
+    FieldTotal total;
+    total.add(layout, bricks);
+    return total.summary(team);
+}
+
+std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks) {
+    const auto of_cell =
+        sum_by_cell(layout, std::uint64_t(0), [&](std::size_t brick, std::uint64_t& sum) {
+            const openvdb::Coord& at = layout.origin(brick);
+            const std::uint64_t place = hash_of(&at, sizeof at, 0);
+            sum += hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
+                           hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
+        });
+    std::uint64_t sum = 0;
+    for (const std::uint64_t value : of_cell) sum += value;
+    return sum;
 }
 
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team) {
@@ -81,7 +115,9 @@ double squared_distance(const BlockLayout& layout, const float* a, const float* 
             sum += d * d;
         }
     };
-    return sum_bricks(layout, team, 0.0, part, [](double& total, double value) { total += value; });
+    CellTotal<double> total(0.0, [](double& sum, const double& more) { sum += more; });
+    total.add(layout, sum_by_cell(layout, 0.0, part));
+    return total.total(team);
 }
 
 void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out) {

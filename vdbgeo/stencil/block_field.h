@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/team.h"
 #include "vdbgeo/stencil/block_layout.h"
+#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo::stencil {
 
@@ -48,7 +49,22 @@ struct FieldSummary {
 /// where there is a team; the same bits however the cells are shared out.
 FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team = nullptr);
 
-/// Σ (a − b)² over the active voxels, likewise.
+/// The same of a field that comes in parts: CellTotal tells in which order.
+class FieldTotal {
+ public:
+    FieldTotal();
+    void add(const BlockLayout& layout, const float* bricks);
+    FieldSummary summary(Team* team = nullptr) const;
+
+ private:
+    CellTotal<FieldSummary> total_;
+};
+
+/// A number that tells this field, and where it lies, from others: of the own cells, to be added up over the
+/// parts of a grid (it wraps around).
+std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks);
+
+/// Σ (a − b)² over the active voxels, in the same order.
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team = nullptr);
 
 /// out = value − offset in the active voxels, 0 in the others. The tree has the layout's leaves.

@@ -15,6 +15,7 @@ namespace {
 
 using leaf::Leaf;
 using openvdb::Coord;
+using openvdb::CoordBBox;
 
 /// Arithmetic shifts round to minus infinity: cells of negative coordinates come out right.
 constexpr int shift_x = 5, shift_y = 5, shift_z = 7;
@@ -37,33 +38,60 @@ std::size_t slot_in_cell(const Coord& o) {
 
 }  // namespace
 
-BlockLayout::BlockLayout(const openvdb::FloatTree& tree, const std::optional<openvdb::CoordBBox>& own) {
+BlockLayout::BlockLayout(const openvdb::FloatTree& tree, const std::optional<CoordBBox>& own) {
     if (tree.hasActiveTiles()) throw InvalidInput("the grid has active tiles where leaves are needed");
     std::vector<const Leaf*> leaves;
     tree.getNodes(leaves);
     leaves.erase(std::remove_if(leaves.begin(), leaves.end(), [](const Leaf* l) { return l->isEmpty(); }),
                  leaves.end());
-    if (leaves.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
-        throw InvalidInput("the grid has more than 2^31 leaves");
     tbb::parallel_sort(leaves.begin(), leaves.end(), [](const Leaf* a, const Leaf* b) {
         return leaf_key(a->origin()) < leaf_key(b->origin());
     });
-    const std::size_t n = leaves.size();
-    origins_.resize(n);
-    masks_.resize(n);
-    full_.resize(n);
-    parallel_for(n, 512, [&](std::size_t i) {
-        origins_[i] = leaves[i]->origin();
+    take(leaves.size(), own, [&](std::size_t i) {
+        LeafMask leaf{leaves[i]->origin(), {}};
         for (openvdb::Index w = 0; w < 8; ++w)
-            masks_[i][w] = leaves[i]->getValueMask().getWord<std::uint64_t>(w);
-        full_[i] = leaves[i]->isDense();
+            leaf.mask[w] = leaves[i]->getValueMask().getWord<std::uint64_t>(w);
+        return leaf;
+    });
+}
+
+BlockLayout::BlockLayout(std::vector<LeafMask> leaves, const std::optional<CoordBBox>& own) {
+    leaves.erase(std::remove_if(leaves.begin(), leaves.end(),
+                                [](const LeafMask& l) { return l.mask == Mask{}; }),
+                 leaves.end());
+    tbb::parallel_sort(leaves.begin(), leaves.end(), [](const LeafMask& a, const LeafMask& b) {
+        return leaf_key(a.origin) < leaf_key(b.origin);
+    });
+    take(leaves.size(), own, [&](std::size_t i) { return leaves[i]; });
+}
+
+/// Leaves come in their order.
+template <class LeafAt>
+void BlockLayout::take(std::size_t leaves, const std::optional<CoordBBox>& own,
+                       const LeafAt& leaf_at) {
+    if (leaves > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
+        throw InvalidInput("the grid has more than 2^31 leaves");
+    origins_.resize(leaves);
+    masks_.resize(leaves);
+    full_.resize(leaves);
+    parallel_for(leaves, 512, [&](std::size_t i) {
+        const LeafMask leaf = leaf_at(i);
+        origins_[i] = leaf.origin;
+        masks_[i] = leaf.mask;
+        full_[i] = std::all_of(leaf.mask.begin(), leaf.mask.end(), [](std::uint64_t w) { return ~w == 0; });
     });
     make_cells(own);
     make_neighbors();
     count_active();
 }
 
+void BlockLayout::work_on(const CoordBBox& own) {
+    for (Cell& cell : cells_) cell.own = own.isInside(cell.origin);
+    count_active();
+}
+
 void BlockLayout::count_active() {
+    active_ = 0;
     for (const Cell& cell : cells_) {
         if (!cell.own) continue;
         for (const std::int32_t b : cell.bricks) {
@@ -74,7 +102,7 @@ void BlockLayout::count_active() {
     }
 }
 
-void BlockLayout::make_cells(const std::optional<openvdb::CoordBBox>& own) {
+void BlockLayout::make_cells(const std::optional<CoordBBox>& own) {
     for (std::size_t i = 0; i < origins_.size(); ++i) {
         const Coord c = cell_of(origins_[i]);
         const Coord first(c.x() * size_x, c.y() * size_y, c.z() * size_z);

@@ -26,6 +26,8 @@ class BlockLayout {
     static constexpr int max_halo = 32;                              ///< voxels
     static constexpr std::int32_t none = -1;
 
+    using Mask = std::array<std::uint64_t, 8>;  ///< word x, bit 8y + z
+
     struct Cell {
         openvdb::Coord origin;  ///< first voxel
         /// Brick of leaf (x, y, z) of the cell at (x · leaves_y + y) · leaves_z + z, or none.
@@ -42,13 +44,22 @@ class BlockLayout {
     struct Run {
         std::int32_t first, last;
     };
-    using Mask = std::array<std::uint64_t, 8>;  ///< word x, bit 8y + z
 
     BlockLayout() = default;
     /// Throws InvalidInput where the tree has active tiles (voxelizeActiveTiles makes leaves of them), or
     /// more than 2^31 leaves. Cost: about 0.3 µs a leaf; 70 to 80 bytes a leaf, 12 for each in a full cell.
     /// `own`: the box of the cells to work on, at multiples of their size; unset: all.
     explicit BlockLayout(const openvdb::FloatTree& tree, const std::optional<openvdb::CoordBBox>& own = {});
+
+    /// The same of leaves that are listed: their first voxels, in any order, and their masks. Those whose mask
+    /// is empty are left out.
+    struct LeafMask {
+        openvdb::Coord origin;
+        Mask mask;
+    };
+    explicit BlockLayout(std::vector<LeafMask> leaves, const std::optional<openvdb::CoordBBox>& own = {});
+    /// From now on operators work on the cells that begin in this box.
+    void work_on(const openvdb::CoordBBox& own);
 
     std::size_t brick_count() const { return origins_.size(); }
     /// Active voxels of the own cells.
@@ -70,6 +81,8 @@ class BlockLayout {
     std::size_t memory() const;
 
  private:
+    template <class LeafAt>
+    void take(std::size_t leaves, const std::optional<openvdb::CoordBBox>& own, const LeafAt& leaf_at);
     void make_cells(const std::optional<openvdb::CoordBBox>& own);
     void count_active();
     void make_neighbors();

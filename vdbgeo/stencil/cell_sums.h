@@ -1,8 +1,8 @@
 // Sums over a grid that have the same bits whoever has which part of it.
 #pragma once
 
-#include <algorithm>
-#include <tuple>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "vdbgeo/core/parallel.h"
@@ -11,36 +11,50 @@
 
 namespace vdbgeo::stencil {
 
-/// Joins what belongs to each cell: first the cells of one line along x, from the lowest on, then the lines
-/// by y and z, over all members of the team. `of_cell`: by the layout's cells; ghosts do not count.
-template <class T, class Join>
-T join_cells(const BlockLayout& layout, Team* team, const std::vector<T>& of_cell, const T& start,
-             const Join& join) {
-    struct Line {
-        int y, z;
-        T sum;
-    };
-    std::vector<Line> lines;
-    for (std::size_t i = 0; i < of_cell.size(); ++i) {
-        const BlockLayout::Cell& cell = layout.cells()[i];
-        if (!cell.own) continue;
-        const int y = cell.origin.y(), z = cell.origin.z();
-        if (lines.empty() || lines.back().y != y || lines.back().z != z) lines.push_back({y, z, start});
-        join(lines.back().sum, of_cell[i]);
-    }
-    if (team) {
-        lines = gather_all(*team, lines);
-        std::sort(lines.begin(), lines.end(),
-                  [](const Line& a, const Line& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
-    }
-    T total = start;
-    for (const Line& line : lines) join(total, line.sum);
-    return total;
-}
+/// Joins what belongs to each cell of a grid: first the cells of one line along x, from the lowest on, then
+/// the lines by y and z, over all members of a team. The cells may come in several layouts, parts of the
+/// grid: of those that share a line the one of lower x first.
+template <class T>
+class CellTotal {
+ public:
+    using Join = void (*)(T& sum, const T& more);
+    CellTotal(const T& start, Join join) : start_(start), join_(join) {}
 
-/// The same with part(brick, T&), which adds a brick to what its cell has so far: in parallel over the cells.
-template <class T, class Part, class Join>
-T sum_bricks(const BlockLayout& layout, Team* team, const T& start, const Part& part, const Join& join) {
+    /// `of_cell`: by the layout's cells; only its own count.
+    void add(const BlockLayout& layout, const std::vector<T>& of_cell) {
+        for (std::size_t i = 0; i < of_cell.size(); ++i) {
+            const BlockLayout::Cell& cell = layout.cells()[i];
+            if (!cell.own) continue;
+            const auto line = lines_.try_emplace({cell.origin.y(), cell.origin.z()}, start_).first;
+            join_(line->second, of_cell[i]);
+        }
+    }
+    /// Of all members, where there is a team; they share out whole lines.
+    T total(Team* team = nullptr) const {
+        struct Line {
+            int y, z;
+            T sum;
+        };
+        std::map<std::pair<int, int>, T> lines = lines_;
+        if (team) {
+            std::vector<Line> mine;
+            for (const auto& [place, sum] : lines) mine.push_back({place.first, place.second, sum});
+            for (const Line& line : gather_all(*team, mine)) lines[{line.y, line.z}] = line.sum;
+        }
+        T all = start_;
+        for (const auto& line : lines) join_(all, line.second);
+        return all;
+    }
+
+ private:
+    T start_;
+    Join join_;
+    std::map<std::pair<int, int>, T> lines_;
+};
+
+/// part(brick, T&) adds a brick to what its cell has so far: in parallel over the own cells.
+template <class T, class Part>
+std::vector<T> sum_by_cell(const BlockLayout& layout, const T& start, const Part& part) {
     std::vector<T> of_cell(layout.cells().size(), start);
     parallel_for(of_cell.size(), 1, [&](std::size_t i) {
         const BlockLayout::Cell& cell = layout.cells()[i];
@@ -50,7 +64,7 @@ T sum_bricks(const BlockLayout& layout, Team* team, const T& start, const Part& 
             if (brick != BlockLayout::none) part(static_cast<std::size_t>(brick), sum);
         of_cell[i] = sum;
     });
-    return join_cells(layout, team, of_cell, start, join);
+    return of_cell;
 }
 
 }  // namespace vdbgeo::stencil

@@ -35,6 +35,8 @@ class ShiftedField {
     bool forward() const { return forward_; }
     void turn() { forward_ = !forward_; }
     std::size_t memory() const { return field_.memory(); }
+    /// All of its memory, what is written next too.
+    BlockField& all() { return field_; }
 
  private:
     BlockField field_;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/stencil/plane_kernels.h"
 #include "vdbgeo/stencil/tiles.h"
 
@@ -149,12 +148,16 @@ void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights
     for_each_tile(layout, fields, [&](Tile& t) { TileDiffusivity(t, options, scale).run(); });
 }
 
-double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights, Team* team) {
-    struct Sums {
-        double square = 0, component[3] = {};
-    };
+GradientTotal::GradientTotal(const Vec3d& weights) : weights_(weights), total_(Sums(), join) {}
+
+void GradientTotal::join(Sums& a, const Sums& b) {
+    a.square += b.square;
+    for (int c = 0; c < 3; ++c) a.component[c] += b.component[c];
+}
+
+void GradientTotal::add(const BlockLayout& layout, const float* u) {
     std::vector<Sums> of_cell(layout.cells().size());
-    const std::array<float, 3> scale = roots(weights);
+    const std::array<float, 3> scale = roots(weights_);
     TileFields fields;
     fields.in = {u};
     fields.halo = 1;
@@ -178,16 +181,24 @@ double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d&
                 }
         }
     });
-    const Sums total = join_cells(layout, team, of_cell, Sums(), [](Sums& a, const Sums& b) {
-        a.square += b.square;
-        for (int c = 0; c < 3; ++c) a.component[c] += b.component[c];
-    });
-    std::vector<std::uint64_t> count{layout.active_count()};
+    total_.add(layout, of_cell);
+    active_ += layout.active_count();
+}
+
+double GradientTotal::variance(Team* team) const {
+    const Sums total = total_.total(team);
+    std::vector<std::uint64_t> count{active_};
     if (team) team->add_up(count);
     const double n = std::max(1.0, static_cast<double>(count[0]));
     double means = 0;
     for (const double c : total.component) means += c / n * (c / n);
     return std::max(0.0, total.square / n - means);
+}
+
+double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights, Team* team) {
+    GradientTotal total(weights);
+    total.add(layout, u);
+    return total.variance(team);
 }
 
 }  // namespace vdbgeo::stencil

@@ -4,6 +4,7 @@
 #include "vdbgeo/core/types.h"
 #include "vdbgeo/stencil/block_field.h"
 #include "vdbgeo/stencil/block_layout.h"
+#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo::stencil {
 
@@ -27,5 +28,24 @@ void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights
 /// where there is a team.
 double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights,
                          Team* team = nullptr);
+
+/// The same of a field that comes in parts, whose own cells have their neighbours: CellTotal tells in which
+/// order.
+class GradientTotal {
+ public:
+    explicit GradientTotal(const Vec3d& weights);
+    void add(const BlockLayout& layout, const float* u);
+    double variance(Team* team = nullptr) const;
+
+ private:
+    struct Sums {
+        double square = 0, component[3] = {};
+    };
+    static void join(Sums& a, const Sums& b);
+
+    Vec3d weights_;
+    std::uint64_t active_ = 0;
+    CellTotal<Sums> total_;
+};
 
 }  // namespace vdbgeo::stencil

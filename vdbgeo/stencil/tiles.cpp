@@ -89,20 +89,18 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
     kernels().finish_writing();
 }
 
-/// Whether a cell is one of those that stand for `every` of them: neighbours along each axis fall to
-/// different ones.
-bool in_sample(const openvdb::Coord& origin, std::size_t every) {
+}  // namespace
+
+bool in_sample(const openvdb::Coord& cell, std::size_t every) {
     if (every == 1) return true;
     const auto at = [](int voxel, int size) {
         return static_cast<std::uint64_t>(std::int64_t{voxel} / size);
     };
-    const std::uint64_t place = at(origin.x(), BlockLayout::size_x) * 73856093u ^
-                                at(origin.y(), BlockLayout::size_y) * 19349663u ^
-                                at(origin.z(), BlockLayout::size_z) * 83492791u;
+    const std::uint64_t place = at(cell.x(), BlockLayout::size_x) * 73856093u ^
+                                at(cell.y(), BlockLayout::size_y) * 19349663u ^
+                                at(cell.z(), BlockLayout::size_z) * 83492791u;
     return place % every == 0;
 }
-
-}  // namespace
 
 void for_each_tile(const BlockLayout& layout, const TileFields& fields,
                    const std::function<void(Tile&)>& body, const Progress& progress) {

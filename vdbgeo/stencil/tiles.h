@@ -41,6 +41,10 @@ struct TileFields {
     std::size_t every = 1;
 };
 
+/// Whether the cell that begins there is one of those that stand for `every` of them: neighbours along each
+/// axis fall to different ones.
+bool in_sample(const openvdb::Coord& cell, std::size_t every);
+
 /// Runs body(tile) for every own cell, in parallel; each thread has its own arrays. (32+2h)² (128+2h') floats
 /// an array. Only active voxels of the cell may be written with something else than 0 in `out`.
 void for_each_tile(const BlockLayout& layout, const TileFields& fields,

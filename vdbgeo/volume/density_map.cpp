@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/noted_statistics.h"
 
 namespace vdbgeo {
 namespace {
@@ -30,15 +31,6 @@ void add(Statistics& s, double& squares, double v, std::uint64_t n) {
     const double step = v - s.mean, many = static_cast<double>(n);
     s.mean += step * many / static_cast<double>(s.count - s.non_finite);
     squares += step * (v - s.mean) * many;
-}
-
-Statistics statistics_of_active(const openvdb::FloatGrid& grid) {
-    Statistics s;
-    double squares = 0;
-    for (auto it = grid.cbeginValueOn(); it; ++it) add(s, squares, *it, it.getVoxelCount());
-    const std::uint64_t finite = s.count - s.non_finite;
-    if (finite > 0) s.rms = std::sqrt(squares / static_cast<double>(finite));
-    return s;
 }
 
 }  // namespace
@@ -109,28 +101,49 @@ DensityMap map_from_grid(const openvdb::FloatGrid::Ptr& grid) {
     DensityMap map;
     map.grid = grid;
     map.frame = frame_of(grid->transform());
-    const auto number = [&](const char* name) { return grid->getMetadata<openvdb::DoubleMetadata>(name); };
     if (const auto size = grid->getMetadata<openvdb::Vec3IMetadata>(size_key)) {
         const Vec3i box(size->value().x(), size->value().y(), size->value().z());
         if (box.minCoeff() < 1) throw InvalidInput(fmt::format("metadata {} is not a size", size_key));
         map.frame.size = box;
     }
-    const auto samples = grid->getMetadata<openvdb::Int64Metadata>("vdbgeo_samples");
-    const auto non_finite = grid->getMetadata<openvdb::Int64Metadata>("vdbgeo_non_finite");
-    const auto min = number("vdbgeo_min"), max = number("vdbgeo_max"), mean = number("vdbgeo_mean"),
-               rms = number("vdbgeo_rms");
-    const bool noted = samples && non_finite && min && max && mean && rms;
-    if (noted && non_finite->value() >= 0 && samples->value() >= non_finite->value()) {
-        map.statistics = {static_cast<std::uint64_t>(samples->value()),
-                          static_cast<std::uint64_t>(non_finite->value()),
-                          min->value(),
-                          max->value(),
-                          mean->value(),
-                          rms->value()};
+    if (const auto noted = noted_statistics(*grid)) {
+        map.statistics = *noted;
     } else {
-        map.statistics = statistics_of_active(*grid);
+        ActiveStatistics all;
+        all.add(*grid);
+        map.statistics = all.result();
     }
     return map;
+}
+
+std::optional<Statistics> noted_statistics(const openvdb::MetaMap& metadata) {
+    const auto count = [&](const char* name) { return metadata.getMetadata<openvdb::Int64Metadata>(name); };
+    const auto number = [&](const char* name) { return metadata.getMetadata<openvdb::DoubleMetadata>(name); };
+    const auto samples = count("vdbgeo_samples"), non_finite = count("vdbgeo_non_finite");
+    const auto min = number("vdbgeo_min"), max = number("vdbgeo_max"), mean = number("vdbgeo_mean"),
+               rms = number("vdbgeo_rms");
+    if (!samples || !non_finite || !min || !max || !mean || !rms || non_finite->value() < 0 ||
+        samples->value() < non_finite->value())
+        return {};
+    Statistics s;
+    s.count = static_cast<std::uint64_t>(samples->value());
+    s.non_finite = static_cast<std::uint64_t>(non_finite->value());
+    s.min = min->value();
+    s.max = max->value();
+    s.mean = mean->value();
+    s.rms = rms->value();
+    return s;
+}
+
+void ActiveStatistics::add(const openvdb::FloatGrid& grid) {
+    for (auto it = grid.cbeginValueOn(); it; ++it) vdbgeo::add(sum_, squares_, *it, it.getVoxelCount());
+}
+
+Statistics ActiveStatistics::result() const {
+    Statistics s = sum_;
+    const std::uint64_t finite = s.count - s.non_finite;
+    if (finite > 0) s.rms = std::sqrt(squares_ / static_cast<double>(finite));
+    return s;
 }
 
 void add_history(openvdb::GridBase& grid, const std::string& line) {

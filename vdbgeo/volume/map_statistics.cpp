@@ -63,24 +63,15 @@ class Sum {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// What lies on one line of leaves along x.
-struct Line {
-    int y, z;
-    Moments moments;
-};
+using Line = StatisticsOfParts::Line;
+using TileValue = StatisticsOfParts::TileValue;
 
-/// So many voxels of tiles have this value.
-struct TileValue {
-    float value;
-    std::uint64_t voxels;
-};
-
-/// Joins `of(leaf)` over the leaves: along x first, then the lines by y and z.
+/// `of(leaf)` of the leaves that begin in `own`, joined along x.
 template <class Of>
-Moments over_leaves(const openvdb::FloatTree& tree, const MapShare& share, const Of& of) {
+std::vector<Line> lines_of(const openvdb::FloatTree& tree, const CoordBBox& own, const Of& of) {
     std::vector<const Leaf*> leaves;
     for (auto it = tree.cbeginLeaf(); it; ++it)
-        if (!share.team || share.own.isInside(it->origin())) leaves.push_back(&*it);
+        if (own.isInside(it->origin())) leaves.push_back(&*it);
     tbb::parallel_sort(leaves.begin(), leaves.end(), [](const Leaf* a, const Leaf* b) {
         const Coord p = a->origin(), q = b->origin();
         return std::make_tuple(p.y(), p.z(), p.x()) < std::make_tuple(q.y(), q.z(), q.x());
@@ -96,19 +87,19 @@ Moments over_leaves(const openvdb::FloatTree& tree, const MapShare& share, const
         lines[l] = {leaves[begins[l]]->origin().y(), leaves[begins[l]]->origin().z(), {}};
         for (std::size_t i = begins[l]; i < end; ++i) lines[l].moments.join(of(*leaves[i]));
     });
-    if (share.team) {
-        lines = gather_all(*share.team, lines);
-        std::sort(lines.begin(), lines.end(),
-                  [](const Line& a, const Line& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
-    }
-    Moments all;
-    for (const Line& line : lines) all.join(line.moments);
-    return all;
+    return lines;
 }
 
-/// Joins tiles by their value, the lowest first.
-void join_tiles(std::vector<TileValue> tiles, const MapShare& share, Moments& all) {
-    if (share.team) tiles = gather_all(*share.team, tiles);
+/// Lines by y and z, then tiles by their value, the lowest first.
+Moments joined(std::vector<Line> lines, std::vector<TileValue> tiles, Team* team) {
+    if (team) {
+        lines = gather_all(*team, lines);
+        tiles = gather_all(*team, tiles);
+    }
+    std::sort(lines.begin(), lines.end(),
+              [](const Line& a, const Line& b) { return std::tie(a.y, a.z) < std::tie(b.y, b.z); });
+    Moments all;
+    for (const Line& line : lines) all.join(line.moments);
     std::sort(tiles.begin(), tiles.end(), [](const TileValue& a, const TileValue& b) {
         return a.value < b.value || (std::isnan(b.value) && !std::isnan(a.value));
     });
@@ -119,68 +110,85 @@ void join_tiles(std::vector<TileValue> tiles, const MapShare& share, Moments& al
         while (i < tiles.size() && !(tiles[i].value != value));
         all.join(many(value, voxels));
     }
+    return all;
 }
 
-Moments moments_in_box(const openvdb::FloatTree& tree, const CoordBBox& box, const MapShare& share) {
-    Moments all = over_leaves(tree, share, [&](const Leaf& leaf) {
-        const CoordBBox own = leaf.getNodeBoundingBox();
-        CoordBBox inside = own;
-        inside.intersect(box);
-        Sum sum;
-        const float* values = leaf.buffer().data();
-        if (inside == own) {
-            for (openvdb::Index i = 0; i < leaf.SIZE; ++i) sum.add(values[i]);
-        } else {
-            for (auto at = inside.begin(); at != inside.end(); ++at) sum.add(values[leaf.coordToOffset(*at)]);
-        }
-        return sum.moments();
-    });
-    std::vector<TileValue> tiles;
-    auto tile = tree.cbeginValueAll();
-    tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+Moments moments_in(const Leaf& leaf, const CoordBBox& box) {
+    const CoordBBox own = leaf.getNodeBoundingBox();
+    CoordBBox inside = own;
+    inside.intersect(box);
+    Sum sum;
+    const float* values = leaf.buffer().data();
+    if (inside == own) {
+        for (openvdb::Index i = 0; i < leaf.SIZE; ++i) sum.add(values[i]);
+    } else {
+        for (auto at = inside.begin(); at != inside.end(); ++at) sum.add(values[leaf.coordToOffset(*at)]);
+    }
+    return sum.moments();
+}
+
+Moments of_active(const Leaf& leaf) {
+    Sum sum;
+    for (auto it = leaf.cbeginValueOn(); it; ++it) sum.add(*it);
+    return sum.moments();
+}
+
+/// Voxels of tiles, active ones alone or all that are not background, that lie in a box.
+template <class Tiles>
+void add_tiles(Tiles tile, const openvdb::FloatTree& tree, bool active, const CoordBBox& box,
+               std::vector<TileValue>& out) {
+    tile.setMaxDepth(Tiles::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         CoordBBox inside;
         tile.getBoundingBox(inside);
         inside.intersect(box);
-        // A node's tiles of the background may lie in several shares: they are told with what has no node.
-        if (share.team) inside.intersect(share.own);
         const float value = *tile, background = tree.background();
-        if (!inside.empty() && std::memcmp(&value, &background, sizeof value) != 0)
-            tiles.push_back({value, inside.volume()});
+        // A node's tiles of the background may lie in several parts: they are told with what has no node.
+        if (!inside.empty() && (active || std::memcmp(&value, &background, sizeof value) != 0))
+            out.push_back({value, inside.volume()});
     }
-    join_tiles(std::move(tiles), share, all);
-    return all;
 }
+
+CoordBBox own_of(const MapShare& share) { return share.team ? share.own : CoordBBox::inf(); }
 
 }  // namespace
 
-Statistics statistics_of(const DensityMap& map, const MapShare& share) {
-    if (!map.frame.bounded()) return active_moments(*map.grid, share).statistics();
-    const Vec3i& n = map.frame.size;
-    const CoordBBox box(Coord(0, 0, 0), Coord(n.x() - 1, n.y() - 1, n.z() - 1));
-    Moments all = moments_in_box(map.grid->constTree(), box, share);
-    const std::uint64_t seen = all.count + all.non_finite, samples = box.volume();
-    if (samples > seen) all.join(many(map.grid->background(), samples - seen));
+void StatisticsOfParts::add(const openvdb::FloatGrid& part, const CoordBBox& own) {
+    const openvdb::FloatTree& tree = part.constTree();
+    std::vector<Line> lines;
+    if (frame_.bounded()) {
+        CoordBBox box(Coord(0), Coord(frame_.size.x() - 1, frame_.size.y() - 1, frame_.size.z() - 1));
+        lines = lines_of(tree, own, [&](const Leaf& leaf) { return moments_in(leaf, box); });
+        box.intersect(own);
+        add_tiles(tree.cbeginValueAll(), tree, false, box, tiles_);
+    } else {
+        lines = lines_of(tree, own, of_active);
+        add_tiles(tree.cbeginValueOn(), tree, true, own, tiles_);
+    }
+    lines_.insert(lines_.end(), lines.begin(), lines.end());
+}
+
+Statistics StatisticsOfParts::statistics(float background, Team* team) const {
+    Moments all = joined(lines_, tiles_, team);
+    if (!frame_.bounded()) return all.statistics();
+    const std::uint64_t seen = all.count + all.non_finite,
+                        samples = std::uint64_t(frame_.size.x()) * std::uint64_t(frame_.size.y()) *
+                                  std::uint64_t(frame_.size.z());
+    if (samples > seen) all.join(many(background, samples - seen));
     return all.statistics();
 }
 
+Statistics statistics_of(const DensityMap& map, const MapShare& share) {
+    StatisticsOfParts all(map.frame);
+    all.add(*map.grid, own_of(share));
+    return all.statistics(map.grid->background(), share.team);
+}
+
 Moments active_moments(const openvdb::FloatGrid& grid, const MapShare& share) {
-    Moments all = over_leaves(grid.constTree(), share, [](const Leaf& leaf) {
-        Sum sum;
-        for (auto it = leaf.cbeginValueOn(); it; ++it) sum.add(*it);
-        return sum.moments();
-    });
+    const openvdb::FloatTree& tree = grid.constTree();
     std::vector<TileValue> tiles;
-    auto tile = grid.constTree().cbeginValueOn();
-    tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) {
-        CoordBBox inside;
-        tile.getBoundingBox(inside);
-        if (share.team) inside.intersect(share.own);
-        if (!inside.empty()) tiles.push_back({*tile, inside.volume()});
-    }
-    join_tiles(std::move(tiles), share, all);
-    return all;
+    add_tiles(tree.cbeginValueOn(), tree, true, own_of(share), tiles);
+    return joined(lines_of(tree, own_of(share), of_active), tiles, share.team);
 }
 
 double rms_difference(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {

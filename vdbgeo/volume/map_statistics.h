@@ -1,6 +1,8 @@
 // Statistics of a map whose values changed, and how much they did.
 #pragma once
 
+#include <vector>
+
 #include "vdbgeo/core/team.h"
 #include "vdbgeo/volume/density_map.h"
 #include "vdbgeo/volume/sparsify.h"
@@ -19,6 +21,31 @@ struct MapShare {
 /// the bits are the same for any number of threads, and for any team that shares out whole lines. Cost: one
 /// pass.
 Statistics statistics_of(const DensityMap& map, const MapShare& share = {});
+
+/// The same of a map that comes in parts.
+class StatisticsOfParts {
+ public:
+    explicit StatisticsOfParts(const Frame& frame) : frame_(frame) {}
+    /// The leaves and tiles of a part that lie in `own`: all of a line of leaves along x, or nothing of it.
+    void add(const openvdb::FloatGrid& part, const openvdb::CoordBBox& own);
+    Statistics statistics(float background, Team* team = nullptr) const;
+
+    /// What lies on one line of leaves along x.
+    struct Line {
+        int y, z;
+        Moments moments;
+    };
+    /// So many voxels of tiles have this value.
+    struct TileValue {
+        float value;
+        std::uint64_t voxels;
+    };
+
+ private:
+    Frame frame_;
+    std::vector<Line> lines_;
+    std::vector<TileValue> tiles_;
+};
 
 /// Count, mean and squared deviations of the active values alone, likewise.
 Moments active_moments(const openvdb::FloatGrid& grid, const MapShare& share = {});

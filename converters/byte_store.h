@@ -1,4 +1,4 @@
-// Bytes that do not fit into memory for now: a file without a name, and a store that begins to use one.
+// Bytes that may not fit into memory: a store that begins to use a file.
 #pragma once
 
 #include <cstddef>
@@ -8,28 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "vdbgeo/core/scratch_file.h"
+
 namespace vdbgeo {
-
-/// A file without a name in `folder`, gone when it is closed, however the process ends. Bytes are added at
-/// its end and read anywhere. Throws IoError naming the folder, where the disk is full too.
-class ScratchFile {
- public:
-    explicit ScratchFile(const std::filesystem::path& folder);
-    ~ScratchFile();
-    ScratchFile(const ScratchFile&) = delete;
-    ScratchFile& operator=(const ScratchFile&) = delete;
-
-    void append(const void* data, std::size_t bytes);
-    /// May be called from many threads.
-    void read(std::uint64_t at, void* out, std::size_t bytes) const;
-    int descriptor() const { return fd_; }
-
- private:
-    [[noreturn]] void fail(const char* doing) const;
-
-    std::filesystem::path folder_;
-    int fd_ = -1;
-};
 
 /// Bytes that come one after another and are read back later: the first `memory` of them are held in memory,
 /// the rest in a ScratchFile.

@@ -1,10 +1,9 @@
-#include "converters/scratch_file.h"
+#include "vdbgeo/core/scratch_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -42,6 +41,18 @@ void ScratchFile::append(const void* data, std::size_t bytes) {
     }
 }
 
+void ScratchFile::write(std::uint64_t at, const void* data, std::size_t bytes) {
+    const char* next = static_cast<const char*>(data);
+    while (bytes > 0) {
+        const ssize_t n = ::pwrite(fd_, next, bytes, static_cast<off_t>(at));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) fail("writing a temporary file failed");
+        next += n;
+        at += static_cast<std::uint64_t>(n);
+        bytes -= static_cast<std::size_t>(n);
+    }
+}
+
 void ScratchFile::read(std::uint64_t at, void* out, std::size_t bytes) const {
     char* next = static_cast<char*>(out);
     while (bytes > 0) {
@@ -53,39 +64,6 @@ void ScratchFile::read(std::uint64_t at, void* out, std::size_t bytes) const {
         at += static_cast<std::uint64_t>(n);
         bytes -= static_cast<std::size_t>(n);
     }
-}
-
-void ByteStore::append(const void* data, std::size_t bytes) {
-    const char* next = static_cast<const char*>(data);
-    while (bytes > 0 && !file_) {
-        const std::uint64_t inside = size_ % chunk;
-        if (inside == 0) {
-            if ((chunks_.size() + 1) * chunk > memory_) {
-                file_.emplace(folder_);
-                break;
-            }
-            chunks_.emplace_back(new char[chunk]);
-        }
-        const std::size_t n = std::min<std::uint64_t>(bytes, chunk - inside);
-        std::memcpy(chunks_.back().get() + inside, next, n);
-        next += n;
-        bytes -= n;
-        size_ += n;
-    }
-    if (bytes > 0) file_->append(next, bytes);
-    size_ += bytes;
-}
-
-void ByteStore::read(std::uint64_t at, void* out, std::size_t bytes) const {
-    char* next = static_cast<char*>(out);
-    while (bytes > 0 && at < held()) {
-        const std::size_t n = std::min<std::uint64_t>({bytes, chunk - at % chunk, held() - at});
-        std::memcpy(next, chunks_[at / chunk].get() + at % chunk, n);
-        next += n;
-        at += n;
-        bytes -= n;
-    }
-    if (bytes > 0) file_->read(at - held(), next, bytes);
 }
 
 }  // namespace vdbgeo

@@ -1,0 +1,133 @@
+#include "apps/block_filter.h"
+
+#include <algorithm>
+
+#include "apps/map_output.h"
+#include "apps/stages.h"
+#include "converters/leaf_source.h"
+#include "converters/map_parts.h"
+#include "converters/mrc_metadata.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/leaf_layout.h"
+#include "vdbgeo/volume/map_statistics.h"
+
+namespace vdbgeo::app {
+namespace {
+
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+
+constexpr std::uint64_t megabyte = std::uint64_t(1) << 20;
+
+std::filesystem::path scratch_of(const MapFilterFlags& flags) {
+    const std::filesystem::path& given = flags.map.options.scratch;
+    return given.empty() ? std::filesystem::absolute(flags.out).parent_path() : given;
+}
+
+/// What reading may take of the memory: strips of the file.
+MapReadOptions reading(const MapFilterFlags& flags) {
+    MapReadOptions out = flags.map.options;
+    out.memory = out.memory_limit() / 4;
+    out.scratch = scratch_of(flags);
+    return out;
+}
+
+/// What is left of the memory for blocks: the program itself, strips of the file and nodes of trees that come
+/// and go take the rest.
+std::uint64_t memory_for_blocks(std::uint64_t limit, std::uint64_t held) {
+    const std::uint64_t taken = 96 * megabyte + held + limit / 6;
+    return limit > taken ? limit - taken : 0;
+}
+
+}  // namespace
+
+bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need) {
+    const MapReadOptions& options = flags.map.options;
+    if (flags.in == "-") return false;
+    if (is_map_parts(flags.in)) return true;
+    const auto samples = samples_in_file(flags, options.memory.has_value());
+    return samples && *samples * need.bytes_a_voxel > static_cast<double>(options.memory_limit()) &&
+           memory_for_blocks(options.memory_limit(), 0) > 0;
+}
+
+BlockFilter::BlockFilter(const MapFilterFlags& flags, Session& session)
+    : flags_(flags), map_(flags.in, reading(flags), session.stage("opening")) {
+    session.end_stage();
+    if (!map_.frame().bounded())
+        throw InvalidInput(flags.in + ": the grid has no box, which blocks of it need; vdbgeo convert makes one");
+    for (const std::string& w : in().warnings) session.warn(flags.in + ": " + w);
+    if (!session.json && !session.quiet)
+        for (const std::string& note : in().notes) session.say(flags.in + ": " + note);
+}
+
+MapSource BlockFilter::source() const {
+    return {map_.box(), in().map.grid->constTransformPtr(),
+            [this](const CoordBBox& box) { return map_.read(box).grid; }};
+}
+
+BlockOptions BlockFilter::options() const {
+    BlockOptions out;
+    out.memory = memory_for_blocks(flags_.map.options.memory_limit(), map_.memory());
+    out.scratch = scratch_of(flags_);
+    return out;
+}
+
+void BlockFilter::need_solver(const std::unique_ptr<BlockedDiffusion>& solver) const {
+    if (!solver) need_samples(flags_.in, Moments(), map_.statistics());
+}
+
+FloatGrid::Ptr BlockFilter::changed(const CoordBBox& slab) const {
+    FloatGrid::Ptr part = map_.read(slab).grid;
+    if (part->tree().hasActiveTiles()) part->tree().voxelizeActiveTiles();
+    solver_->store(slab, part->tree());
+    if (cleared_) clear_inactive(*part);
+    return part;
+}
+
+void BlockFilter::finish(const BlockedDiffusion& solver, bool cleared, const std::string& history,
+                         const Progress& progress) {
+    solver_ = &solver;
+    cleared_ = cleared;
+    result_ = in().map;
+    result_.grid = in().map.grid->copyWithNewTree();
+    // Shared: a copy of a transform rounds its scale.
+    result_.grid->setTransform(in().map.grid->transformPtr());
+    if (cleared) clear_inactive(*result_.grid);
+    StatisticsOfParts all(result_.frame);
+    // Whole rows of leaves along x and y, so that the lines along x are whole.
+    CoordBBox slab = map_.box();
+    const int begin = slab.min().z() / leaf::dim * leaf::dim, end = slab.max().z();
+    for (int z = begin; z <= end; z += leaf::dim) {
+        slab.min().z() = z;
+        slab.max().z() = z + leaf::dim - 1;
+        all.add(*changed(slab), slab);
+        progress.report(double(z - begin + leaf::dim) / double(end - begin + leaf::dim));
+    }
+    result_.statistics = all.statistics(result_.grid->background());
+    note_new_values(result_, history);
+}
+
+void BlockFilter::write(Json& result, Session& session) const {
+    const Progress progress = session.stage("writing");
+    LeafSource leaves;
+    leaves.frame = result_.frame;
+    leaves.meta = static_cast<const openvdb::MetaMap&>(*result_.grid);
+    leaves.transform = result_.grid->constTransformPtr();
+    leaves.background = result_.grid->background();
+    leaves.active_box = map_.box();
+    const bool vdb = has_ending(flags_.out, ".vdb");
+    const int axis = vdb ? 2 : recall_mrc_metadata(leaves.meta).order[2];
+    leaves.finder =
+        slab_finder(axis, map_.box(), [this](const CoordBBox& slab) { return changed(slab); });
+    if (!vdb) {
+        const MrcWriteReport report = write_mrc(leaves, flags_.out, flags_.mrc, progress);
+        session.end_stage();
+        report_written(flags_.out, report, result, session);
+        return;
+    }
+    const BlockOptions blocks = options();
+    write_vdb(leaves, flags_.out, flags_.vdb, blocks.memory / 2, blocks.scratch, progress);
+    session.end_stage();
+}
+
+}  // namespace vdbgeo::app

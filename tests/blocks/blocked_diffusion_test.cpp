@@ -1,0 +1,166 @@
+// Diffusion in blocks, with the values in files between cycles, gives each voxel the bits that it gets in one
+// grid in memory.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <map>
+
+#include "tests/blocks/noisy_map.h"
+#include "tests/support/temp_folder.h"
+#include "vdbgeo/blocks/blocked_diffusion.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_part.h"
+
+namespace vdbgeo {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+
+MapSource source_of(const FloatGrid& grid) {
+    return {grid.evalActiveVoxelBoundingBox(), grid.constTransformPtr(),
+            [&grid](const CoordBBox& box) { return part_of(grid, box); }};
+}
+
+/// How many values differ, and that none is missing.
+void expect_same(const FloatGrid& expected, const FloatGrid& given) {
+    EXPECT_EQ(expected.activeVoxelCount(), given.activeVoxelCount());
+    std::uint64_t different = 0;
+    for (auto it = expected.cbeginValueOn(); it; ++it) {
+        const float value = given.tree().getValue(it.getCoord());
+        different += std::memcmp(&*it, &value, sizeof value) != 0;
+    }
+    EXPECT_EQ(different, 0u);
+}
+
+/// What the solver made, slab by slab.
+FloatGrid::Ptr result_of(const BlockedDiffusion& solver, const FloatGrid& input) {
+    const FloatGrid::Ptr all = input.deepCopy();
+    const CoordBBox box = input.evalActiveVoxelBoundingBox();
+    for (int z = -64; z <= box.max().z(); z += 8) {
+        const CoordBBox slab(Coord(-1000, -1000, z), Coord(1000, 1000, z + 7));
+        const FloatGrid::Ptr part = part_of(input, slab);
+        solver.store(slab, part->tree());
+        for (auto it = part->cbeginValueOn(); it; ++it)
+            if (slab.isInside(it.getCoord())) all->tree().setValue(it.getCoord(), *it);
+    }
+    return all;
+}
+
+struct Shape {
+    const char* name;
+    std::optional<Coord> size;
+    std::optional<int> steps;
+    std::uint64_t memory;
+};
+
+class BlockedHyperdiffusion : public ::testing::TestWithParam<Shape> {};
+
+TEST_P(BlockedHyperdiffusion, HasTheBitsOfOneGrid) {
+    static const FloatGrid::Ptr input = test::noisy_map();
+    const test::TempFolder folder;
+    const Shape& shape = GetParam();
+    for (const test::DiffusionSetting& setting : test::diffusion_settings()) {
+        SCOPED_TRACE(setting.name);
+        static std::map<std::string, std::pair<FloatGrid::Ptr, HyperdiffusionReport>> in_one;
+        auto& [expected, alone] = in_one[setting.name];
+        if (!expected) {
+            expected = input->deepCopy();
+            alone = hyperdiffuse(*expected, setting.options);
+        }
+        HyperdiffusionReport report;
+        const BlockOptions options{shape.memory, folder.path(), shape.size, shape.steps};
+        const auto solver = hyperdiffuse_blocks(source_of(*input), setting.options, options, report);
+        ASSERT_TRUE(solver);
+        EXPECT_GT(solver->most_blocks(), shape.name == std::string("large") ? 0u : 1u);
+        EXPECT_EQ(report.steps, alone.steps);
+        EXPECT_EQ(report.time, alone.time);
+        EXPECT_EQ(report.noise, alone.noise);
+        EXPECT_EQ(report.removed, alone.removed);
+        EXPECT_EQ(report.mean_before, alone.mean_before);
+        EXPECT_EQ(report.mean_after, alone.mean_after);
+        EXPECT_EQ(report.active_voxels, alone.active_voxels);
+        expect_same(*expected, *result_of(*solver, *input));
+    }
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Shapes, BlockedHyperdiffusion,
+                         ::testing::Values(Shape{"cells", Coord(32, 32, 128), {}, 0},
+                                           Shape{"pencils", Coord(128, 64, 128), 8, 0},
+                                           Shape{"slabs_of_few_steps", Coord(128, 32, 512), 4, 0},
+                                           Shape{"by_memory", {}, {}, 24000000},
+                                           Shape{"large", {}, {}, 2000000000}),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+TEST(BlockedHighPass, HasTheBitsOfOneGrid) {
+    const FloatGrid::Ptr input = test::noisy_map();
+    const test::TempFolder folder;
+    HighPassOptions options;
+    options.slow = 0.1;
+    options.time = 5;
+    for (const int order : {0, 1}) {
+        options.order = order;
+        const FloatGrid::Ptr expected = input->deepCopy();
+        const HyperdiffusionReport alone = coupled_high_pass(*expected, options);
+        for (const std::optional<int> steps : {std::optional<int>(), std::optional<int>(8)}) {
+            HyperdiffusionReport report;
+            const auto solver = coupled_high_pass_blocks(
+                source_of(*input), options, {0, folder.path(), Coord(64, 64, 128), steps}, report);
+            ASSERT_TRUE(solver);
+            EXPECT_EQ(report.mean_after, alone.mean_after);
+            EXPECT_EQ(report.removed, alone.removed);
+            expect_same(*expected, *result_of(*solver, *input));
+        }
+    }
+}
+
+TEST(BlockedHyperdiffusionErrors, AreThoseOfOneGrid) {
+    const FloatGrid::Ptr input = test::noisy_map();
+    const test::TempFolder folder;
+    HyperdiffusionOptions o;
+    o.steps = 3;
+    HyperdiffusionReport report;
+    const BlockOptions blocks{0, folder.path(), Coord(64, 64, 128), {}};
+    HyperdiffusionOptions adi = o;
+    adi.stepper = Stepper::adi;
+    EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), adi, blocks, report), InvalidInput);
+    EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, {1000, folder.path(), {}, {}}, report),
+                 NumericalError);
+    EXPECT_THROW(
+        hyperdiffuse_blocks(source_of(*input), o, {0, "/not/there", Coord(64, 64, 128), {}}, report), IoError);
+    input->tree().setValueOn(Coord(30, 70, 70), std::nanf(""));
+    EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, blocks, report), InvalidInput);
+    const FloatGrid::Ptr empty = test::empty_grid();
+    MapSource nothing = source_of(*empty);
+    nothing.box = CoordBBox(Coord(0), Coord(63));
+    EXPECT_FALSE(hyperdiffuse_blocks(nothing, o, blocks, report));
+}
+
+TEST(BlockPlan, FitsIntoTheMemoryAndCoversTheMap) {
+    BlockWork work;
+    work.steps = 40;
+    work.steps_a_sweep = 4;
+    work.reach = 2;
+    work.first_reach = 3;
+    work.bytes_a_brick = 3 * 2048;
+    const CoordBBox box(Coord(0), Coord(1289));
+    for (const double gigabytes : {0.5, 2.0, 8.0, 64.0}) {
+        const BlockPlan plan = plan_blocks(box, work, static_cast<std::uint64_t>(gigabytes * 1e9));
+        double voxels = 0;
+        for (const CoordBBox& block : plan.blocks) {
+            CoordBBox with_ghosts = block;
+            with_ghosts.expand(plan.halo);
+            with_ghosts.intersect(CoordBBox(Coord(0), Coord(1311, 1311, 1407)));
+            EXPECT_LE(double(with_ghosts.volume()) / 512 * work.bytes_a_brick, gigabytes * 1e9);
+            voxels += double(block.volume());
+        }
+        EXPECT_EQ(voxels, 1312.0 * 1312 * 1408);
+        EXPECT_GE(plan.halo, plan.steps * work.reach + work.first_reach);
+        EXPECT_EQ(plan.blocks.size() == 1, gigabytes > 60);
+    }
+}
+
+}  // namespace
+}  // namespace vdbgeo

@@ -1,0 +1,118 @@
+// Diffusion of a map that does not fit into memory: block by block, with the values in files between cycles.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "vdbgeo/blocks/block_plan.h"
+#include "vdbgeo/blocks/brick_index.h"
+#include "vdbgeo/flow/coupled_high_pass.h"
+#include "vdbgeo/flow/cycles.h"
+#include "vdbgeo/flow/diffusion_fields.h"
+#include "vdbgeo/stencil/block_field.h"
+
+namespace vdbgeo {
+
+/// A map that is read in parts, as often as they are wanted.
+struct MapSource {
+    openvdb::CoordBBox box;  ///< holds all leaves
+    openvdb::math::Transform::ConstPtr transform;
+    /// The leaves and tiles that reach into a box, with the values, masks and background of the whole.
+    std::function<openvdb::FloatGrid::Ptr(const openvdb::CoordBBox& wanted)> read;
+};
+
+struct BlockOptions {
+    std::uint64_t memory = 0;       ///< bytes that may be taken for the blocks
+    std::filesystem::path scratch;  ///< folder of temporary files
+    /// Blocks of this size (at multiples of 32, 32 and 128 voxels) and so many steps; unset: as memory goes.
+    std::optional<openvdb::Coord> size;
+    std::optional<int> steps;
+    CheckpointOptions checkpoint;
+};
+
+/// The same values as DiffusionSolver's, to the bit, whatever the blocks. A block is read with so many ghosts
+/// that all steps of a cycle, or some of them, can be taken in it: ghosts lose a rim of q+1 voxels a step.
+/// Between cycles the fields are in temporary files, 4 bytes a voxel each, twice. Memory: `memory`, and 64
+/// bytes for each leaf that is not full.
+class BlockedDiffusion : public CycleSolver {
+ public:
+    /// Goes through the map twice. Errors as DiffusionSolver; NumericalError where the memory is too small.
+    BlockedDiffusion(MapSource source, std::vector<DiffusionProblem::Field> fields, const EdgeScale& sigma,
+                     const BlockOptions& options, const Progress& progress = {});
+
+    double step(Stepper stepper, const std::optional<double>& dt) const;
+    bool constant_coefficients() const override { return problem_.constant_coefficients(); }
+    std::uint64_t active_voxels() const override { return before_.count; }
+    void cycle(Stepper stepper, int n, double tau, const Progress& progress) override;
+    void reset() override;
+    double removed() override;
+    std::uint64_t input_hash() override { return input_hash_; }
+    std::size_t fields() const override { return problem_.fields.size(); }
+    void save(StateWriter& writer) override;
+    void load(const StateReader& reader) override;
+    void describe(HyperdiffusionReport& report);
+    /// Of X, less its mean.
+    const stencil::FieldSummary& before() const { return before_; }
+    std::size_t most_blocks() const { return most_blocks_; }
+
+    /// Writes what DiffusionSolver::store writes into the leaves of a part, as the source gives it, that
+    /// begin in `box`.
+    void store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const;
+
+ private:
+    /// A field in files: what it was, and what it becomes.
+    struct Generations {
+        std::unique_ptr<BrickFile> now, next;
+    };
+    struct Totals;
+    struct Part;
+
+    std::uint64_t memory_for_blocks() const;
+    BlockPlan plan(const BlockWork& work, const BrickIndex* index) const;
+    BlockPlan reading_plan(int ghosts) const;
+    BlockPlan copying_plan(int ghosts) const;
+    BlockWork work_of(Stepper stepper, int n) const;
+    openvdb::FloatGrid::Ptr read(const openvdb::CoordBBox& box) const;
+    void find_mean(const Progress& progress);
+    void find_edges(const Progress& progress);
+    void take_part(const Part& part, const openvdb::CoordBBox& own, Totals& totals);
+    void load(const Part& part, const BrickIndex::Part& bricks, const openvdb::CoordBBox& box,
+              DiffusionFields& fields) const;
+    void put_down(const Part& part, const BrickIndex::Part& bricks, const openvdb::CoordBBox& own,
+                  DiffusionFields& fields);
+    void keep(const Totals& totals);
+
+    MapSource source_;
+    BlockOptions options_;
+    DiffusionProblem problem_;
+    BrickIndex index_;
+    std::vector<Generations> now_, step_before_;  // by field
+    std::vector<std::unique_ptr<BrickFile>> coefficients_;
+    bool is_input_ = true;  // u = X: nothing is in the files
+    stencil::FieldSummary before_;
+    std::vector<stencil::FieldSummary> summary_;
+    EdgeMeasure first_measure_, measure_;
+    float offset_ = 0;
+    std::uint64_t input_hash_ = 0;
+    std::size_t most_blocks_ = 0, most_memory_ = 0;
+};
+
+/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. Null where no voxel
+/// is active.
+std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
+                                                      const HyperdiffusionOptions& options,
+                                                      const BlockOptions& blocks,
+                                                      HyperdiffusionReport& report,
+                                                      const Progress& progress = {});
+std::unique_ptr<BlockedDiffusion> coupled_high_pass_blocks(const MapSource& source,
+                                                           const HighPassOptions& options,
+                                                           const BlockOptions& blocks,
+                                                           HyperdiffusionReport& report,
+                                                           const Progress& progress = {});
+
+}  // namespace vdbgeo

@@ -31,6 +31,8 @@ class Message : public Team::Incoming {
         if (request_ == MPI_REQUEST_NULL) return;
         MPI_Cancel(&request_);
         MPI_Request_free(&request_);
+        // It may be on its way already, and come in while those that gave up meet: its place has to stay.
+        new std::vector<float>(std::move(data_));
     }
     std::vector<float> take() override {
         MPI_Wait(&request_, MPI_STATUS_IGNORE);
@@ -54,7 +56,10 @@ class MpiRun::Members : public Team {
         MPI_Comm_dup(MPI_COMM_WORLD, &untagged);
     }
     ~Members() override {
-        if (gave_up) return;
+        if (gave_up) {
+            new std::list<Sent>(std::move(sent_));  // nobody may take them: they are not waited for
+            return;
+        }
         for (Sent& s : sent_) MPI_Wait(&s.request, MPI_STATUS_IGNORE);
         MPI_Comm_free(&failing);
         MPI_Comm_free(&untagged);

@@ -15,6 +15,7 @@
 #include "converters/mesh_file.h"
 #include "vdbgeo/blocks/team_marching_cubes.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/run_together.h"
 #include "vdbgeo/surface/label_surfaces.h"
 
 namespace vdbgeo::app {
@@ -190,44 +191,33 @@ void check_for_team(const SurfaceOptions& o, const Isovalue& rule) {
         throw UsageError("--iso: a team takes a density, a number of sigmas, record:FILE or auto");
 }
 
-/// Takes a file away unless it was kept, or a failure comes first.
-class Unfinished {
- public:
-    explicit Unfinished(std::string name) : name_(std::move(name)) {}
-    ~Unfinished() {
-        std::error_code ignored;
-        if (!name_.empty()) std::filesystem::remove(name_, ignored);
-    }
-    Unfinished(const Unfinished&) = delete;
-    Unfinished& operator=(const Unfinished&) = delete;
-
-    const std::string& name() const { return name_; }
-    void keep() { name_.clear(); }
-
- private:
-    std::string name_;
-};
-
-/// All members write into one file, which the first makes and puts in its place.
+/// Every member puts what it has where it belongs in one file, which the first makes, and which has its name when
+/// all of it is there.
 void write_by_team(const TeamSurface& surface, const std::string& out, Team& team, const Progress& progress) {
-    Unfinished unfinished(out + ".unfinished");
-    std::optional<PlyPieces> file;
+    const std::string unfinished = out + ".unfinished";
     const bool first = team.rank() == 0;
-    if (first) file.emplace(unfinished.name(), true, surface.vertices, surface.triangles);
-    wait_for_all(team);
-    if (!first) file.emplace(unfinished.name(), false, surface.vertices, surface.triangles);
-    if (first) file->put_header();
-    put_piece(surface.piece, *file);
-    progress.report(0.5);
-    file->close();
-    wait_for_all(team);
-    if (first) {
-        std::error_code error;
-        std::filesystem::rename(unfinished.name(), out, error);
-        if (error) throw IoError(fmt::format("{}: cannot be written: {}", out, error.message()));
+    std::error_code error;
+    std::optional<PlyPieces> file;
+    const auto open = [&] { file.emplace(unfinished, first, surface.vertices, surface.triangles); };
+    try {
+        run_together(team, [&] {
+            if (first) open();
+        });
+        run_together(team, [&] {
+            if (!first) open();
+            if (first) file->put_header();
+            put_piece(surface.piece, *file);
+            progress.report(0.5);
+            file->close();
+        });
+        run_together(team, [&] {
+            if (first) std::filesystem::rename(unfinished, out, error);
+            if (error) throw IoError(fmt::format("{}: cannot be written: {}", out, error.message()));
+        });
+    } catch (const std::exception&) {
+        if (first) std::filesystem::remove(unfinished, error);
+        throw;
     }
-    unfinished.keep();
-    wait_for_all(team);
 }
 
 /// Every member extracts the surface in its part and puts it where it belongs in the one file.
@@ -254,8 +244,7 @@ void run_surface_by_team(const SurfaceOptions& o, Session& session) {
                         "{:.6g}; try another --iso",
                         o.in, iso, part.statistics.min, part.statistics.max));
     seconds["compute"] = clock.lap();
-    const Progress progress = session.stage("writing");
-    write_by_team(surface, o.out, team, progress);
+    write_by_team(surface, o.out, team, session.stage("writing"));
     session.end_stage();
     seconds["write"] = clock.lap();
     std::vector<std::uint64_t> sent{surface.bytes_sent};

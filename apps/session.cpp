@@ -169,6 +169,8 @@ void install_interrupt_handler() {
     action.sa_handler = on_interrupt;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
+    // mpirun and srun pass it on at once; on SIGTERM they kill.
+    sigaction(SIGUSR1, &action, nullptr);
     signal(SIGPIPE, SIG_IGN);  // a closed pipe is a write error, not a silent death
     signal(SIGXFSZ, SIG_IGN);  // so is a file that grew over its limit
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <functional>
 
 #include "apps/map_output.h"
 #include "apps/stages.h"
@@ -10,6 +11,7 @@
 #include "converters/map_parts.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/run_together.h"
 #include "vdbgeo/volume/map_statistics.h"
 
 namespace vdbgeo::app {
@@ -42,22 +44,10 @@ MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, in
     return map;
 }
 
-/// What lies above a band is tiles that are not active: parts of such maps lose leaves when they are written.
-static void refuse_bands(const std::string& name, const openvdb::FloatTree& tree, Team& team) {
-    std::vector<std::uint64_t> tiles{0};
-    auto tile = tree.cbeginValueOff();
-    tile.setMaxDepth(openvdb::FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) tiles[0] += *tile != tree.background();
-    team.add_up(tiles);
-    if (tiles[0] > 0)
-        throw InvalidInput(name + ": a map with a band is not filtered in parts yet: vdbgeo does it whole");
-}
-
 FilterInput read_filter_input(const MapFilterFlags& flags, const MemoryNeed& need, int halo,
                               Session& session) {
     if (!session.team) return {read_for_filter(flags, need, session), {}};
     MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
-    refuse_bands(flags.in, map.in.map.grid->constTree(), *session.team);
     FilterInput input{std::move(map.in), std::move(map.share)};
     need_samples(flags.in, active_moments(*input.in.map.grid, input.counted()), input.in.map.statistics);
     return input;
@@ -77,29 +67,46 @@ void check_team_output(const MapFilterFlags& flags, Session& session) {
     check_folder_of(flags.out);
 }
 
+/// Makes the one file of the parts, and takes them away.
+static void write_whole(const MapFilterFlags& flags, const fs::path& folder, const Progress& progress,
+                        Json& result, Session& session) {
+    const auto report = merge_parts(folder, flags.out, flags.map.options, flags.vdb, flags.mrc, progress);
+    session.end_stage();
+    if (report) report_written(flags.out, *report, result, session);
+    remove_map_parts(folder);
+}
+
 /// Every member writes its part into a folder beside the output, and then one of them makes them one file.
+/// Where that fails no part is left.
 static void write_by_team(const MapFilterFlags& flags, const DensityMap& map, const stencil::Share& share,
                           Json& result, Session& session) {
     Team& team = *share.team;
     const fs::path folder = folder_of_parts(flags.out);
     const Progress progress = session.stage("writing");
-    if (team.rank() == 0) {
+    const auto by_the_first = [&](const std::function<void()>& step) {
+        run_together(team, [&] {
+            if (team.rank() == 0) step();
+        });
+    };
+    by_the_first([&] {
         remove_map_parts(folder);
         std::error_code error;
         fs::create_directories(folder, error);
         if (error) throw IoError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+    });
+    try {
+        run_together(team, [&] {
+            write_map_part(map, share.own(), team.rank(), folder, flags.vdb, progress.part(0, 0.4));
+        });
+        if (folder != fs::path(flags.out))
+            by_the_first([&] { write_whole(flags, folder, progress.part(0.4, 1), result, session); });
+    } catch (const std::exception&) {
+        try {
+            if (team.rank() == 0) remove_map_parts(folder);
+        } catch (const IoError&) {  // what went wrong first is what there is to tell
+        }
+        throw;
     }
-    wait_for_all(team);
-    write_map_part(map, share.own(), team.rank(), folder, flags.vdb, progress.part(0, 0.4));
-    wait_for_all(team);
-    if (team.rank() == 0 && folder != fs::path(flags.out)) {
-        const auto report =
-            merge_parts(folder, flags.out, flags.map.options, flags.vdb, flags.mrc, progress.part(0.4, 1));
-        session.end_stage();
-        if (report) report_written(flags.out, *report, result, session);
-        remove_map_parts(folder);
-    }
-    wait_for_all(team);
     session.end_stage();
 }
 

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <tuple>
 
+#include "converters/map_blocks.h"
 #include "converters/map_box.h"
+#include "converters/map_parts.h"
+#include "converters/vdb_sections.h"
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {
@@ -84,18 +86,29 @@ MapFile read_mrc_part(const std::filesystem::path& path, const MapReadOptions& o
     return result;
 }
 
-MapFile part_of_vdb(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part) {
-    MapFile whole = read_map(path, options);
-    whole.map.grid = part_of(*whole.map.grid, part.wanted);
-    return whole;
+/// A grid in a VDB file, or in several that are its parts.
+bool holds_grid(const std::filesystem::path& path) { return is_map_parts(path) || is_vdb_file(path); }
+
+openvdb::FloatGrid::Ptr empty_grid(const std::filesystem::path& path, const MapReadOptions& options) {
+    return is_map_parts(path) ? MapParts(path).empty_grid() : VdbSections(path, options.grid).empty_grid();
+}
+
+MapFile part_of_grid(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
+                     const Progress& progress) {
+    const MapBlocks map(path, options);
+    MapFile result = map.whole();
+    result.map = map.read(part.wanted, progress);
+    openvdb::FloatTree& tree = result.map.grid->tree();
+    if (tree.hasActiveTiles()) tree.voxelizeActiveTiles();
+    return result;
 }
 
 }  // namespace
 
 Frame map_frame(const std::filesystem::path& path, const MapReadOptions& options) {
     options.check();
-    if (!is_vdb_file(path)) return StripSource(path, options, 1).frame();
-    const Frame frame = read_map(path, options).map.frame;
+    if (!holds_grid(path)) return StripSource(path, options, 1).frame();
+    const Frame frame = map_of_vdb(empty_grid(path, options), path, options).map.frame;
     if (!frame.bounded())
         throw InvalidInput(path.string() +
                            ": the grid has no box, which parts of it need; vdbgeo convert makes one");
@@ -106,8 +119,8 @@ MapFile read_map_part(const std::filesystem::path& path, const MapReadOptions& o
                       const Progress& progress) {
     options.check();
     if (path == "-") throw InvalidInput("-: parts are read from a file, not from a pipe");
-    return is_vdb_file(path) ? part_of_vdb(path, options, part)
-                             : read_mrc_part(path, options, part, progress);
+    return holds_grid(path) ? part_of_grid(path, options, part, progress)
+                            : read_mrc_part(path, options, part, progress);
 }
 
 }  // namespace vdbgeo

@@ -13,15 +13,15 @@ struct MapPart {
     openvdb::CoordBBox wanted;  ///< own box and ghosts: leaves and tiles that reach into it are kept
 };
 
-/// The frame of the map that read_map_part would read parts of: the header is all that is looked at. A grid
-/// of a VDB file is read whole for it, and has to be bounded.
+/// The frame of the map that read_map_part would read parts of: the header is all that is looked at, of a VDB
+/// file where its leaves lie. Its grid has to be bounded.
 Frame map_frame(const std::filesystem::path& path, const MapReadOptions& options = {});
 
 /// The leaves of read_map that lie in a part, to the same bits; frame, statistics, background, metadata,
 /// notes and warnings are those of the whole map. All members call it. Of a plain MRC file whose rows or
 /// sections run along y each member reads the rows of its part; what needs a pass of its own over the samples
-/// (statistics, percentile, selection) every member does by itself. A grid of a VDB file is read whole by all
-/// of them.
+/// (statistics, percentile, selection) every member does by itself. Of a VDB file, or of a folder of parts,
+/// each notes where all leaves lie, and decodes those of its part; active tiles become leaves.
 MapFile read_map_part(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
                       const Progress& progress = {});
 

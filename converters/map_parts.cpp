@@ -26,11 +26,15 @@ bool is_part(const fs::path& file) {
     return name.rfind("part_", 0) == 0 && file.extension() == ".vdb";
 }
 
-std::vector<fs::path> part_files(const fs::path& folder) {
+/// What a process that was killed left, where files without a name cannot be made: AtomicFile's temporary.
+bool is_unfinished(const fs::path& file) { return file.filename().string().rfind(".vdbgeo.", 0) == 0; }
+
+template <class Wanted>
+std::vector<fs::path> files_in(const fs::path& folder, const Wanted& wanted) {
     std::vector<fs::path> files;
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder, error))
-        if (is_part(entry.path())) files.push_back(entry.path());
+        if (wanted(entry.path())) files.push_back(entry.path());
     if (error) throw IoError(fmt::format("{}: cannot be listed: {}", folder.string(), error.message()));
     std::sort(files.begin(), files.end());
     return files;
@@ -63,9 +67,8 @@ void write_map_part(const DensityMap& map, const CoordBBox& own, int number, con
         CoordBBox inside;
         tile.getBoundingBox(inside);
         inside.intersect(own);
-        for (auto at = inside.begin(); at != inside.end(); ++at)
-            if (((*at).x() & 7) == 0 && ((*at).y() & 7) == 0 && ((*at).z() & 7) == 0)
-                part->tree().addTile(1, *at, *tile, tile.isValueOn());
+        // Where they do not touch, the intersection still has corners, and they may lie among own leaves.
+        if (inside.hasVolume()) part->tree().sparseFill(inside, *tile, tile.isValueOn());
     }
     part->insertMeta(box_begin, openvdb::Vec3IMetadata(own.min().asVec3i()));
     part->insertMeta(box_end, openvdb::Vec3IMetadata(own.max().asVec3i()));
@@ -75,7 +78,8 @@ void write_map_part(const DensityMap& map, const CoordBBox& own, int number, con
 void remove_map_parts(const fs::path& folder) {
     std::error_code error;
     if (!fs::is_directory(folder, error)) return;
-    for (const fs::path& file : part_files(folder))
+    for (const fs::path& file :
+         files_in(folder, [](const fs::path& f) { return is_part(f) || is_unfinished(f); }))
         if (!fs::remove(file, error))
             throw IoError(fmt::format("{}: cannot be removed: {}", file.string(), error.message()));
     if (fs::is_empty(folder, error)) fs::remove(folder, error);
@@ -120,7 +124,7 @@ VdbSections::Leaves MapParts::State::leaf_reader() const {
 
 MapParts::MapParts(const fs::path& folder) : state_(std::make_unique<State>()) {
     State& s = *state_;
-    for (const fs::path& file : part_files(folder)) {
+    for (const fs::path& file : files_in(folder, is_part)) {
         s.parts.emplace_back(file);
         const VdbSections& part = s.parts.back();
         const CoordBBox box = box_of_part(part, file);

@@ -18,8 +18,8 @@ void write_map_part(const DensityMap& map, const openvdb::CoordBBox& own, int nu
                     const std::filesystem::path& folder, const VdbWriteOptions& options = {},
                     const Progress& progress = {});
 
-/// Takes the parts out of a folder, and nothing else; the folder too where nothing is left. One that is not
-/// there is left alone. IoError.
+/// Takes the parts out of a folder, with what is left of such as were never finished, and nothing else; the
+/// folder too where nothing is left. One that is not there is left alone. IoError.
 void remove_map_parts(const std::filesystem::path& folder);
 
 /// Whether that is a folder of parts.

@@ -31,6 +31,8 @@ class Message : public Team::Incoming {
         if (request_ == MPI_REQUEST_NULL) return;
         MPI_Cancel(&request_);
         MPI_Request_free(&request_);
+        // It may be on its way already, and come in while those that gave up meet: its place has to stay.
+        new std::vector<float>(std::move(data_));
     }
     std::vector<float> take() override {
         MPI_Wait(&request_, MPI_STATUS_IGNORE);
@@ -50,14 +52,20 @@ class MpiRun::Members : public Team {
         MPI_Comm_size(MPI_COMM_WORLD, &size_);
         MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
         MPI_Comm_dup(MPI_COMM_WORLD, &failing);
+        MPI_Comm_set_errhandler(failing, MPI_ERRORS_RETURN);  // others may be gone
         MPI_Comm_dup(MPI_COMM_WORLD, &untagged);
     }
     ~Members() override {
-        if (gave_up) return;
+        if (gave_up) {
+            new std::list<Sent>(std::move(sent_));  // nobody may take them: they are not waited for
+            return;
+        }
         for (Sent& s : sent_) MPI_Wait(&s.request, MPI_STATUS_IGNORE);
         MPI_Comm_free(&failing);
         MPI_Comm_free(&untagged);
     }
+
+    static constexpr auto patience = std::chrono::seconds(2);
 
     MPI_Comm failing = MPI_COMM_NULL;   ///< where those meet that give up, whatever goes on elsewhere
     MPI_Comm untagged = MPI_COMM_NULL;  ///< for the messages of exchange
@@ -132,6 +140,34 @@ class MpiRun::Members : public Team {
         }
     }
 
+    /// Tells all others that this one failed. Returns who did, once all have or there was time enough.
+    std::vector<bool> meet_those_that_failed() {
+        using Clock = std::chrono::steady_clock;
+        std::vector<MPI_Request> told;
+        for (int r = 0; r < size_; ++r) {
+            if (r == rank_) continue;
+            told.push_back(MPI_REQUEST_NULL);
+            MPI_Isend(nullptr, 0, MPI_BYTE, r, 0, failing, &told.back());
+        }
+        std::vector<bool> failed(static_cast<std::size_t>(size_));
+        failed[static_cast<std::size_t>(rank_)] = true;
+        int alive = size_ - 1;
+        for (const auto begin = Clock::now(); alive > 0 && Clock::now() - begin < patience;) {
+            int there = 0;
+            MPI_Status status;
+            MPI_Iprobe(MPI_ANY_SOURCE, 0, failing, &there, &status);
+            if (!there) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(5));
+                continue;
+            }
+            MPI_Recv(nullptr, 0, MPI_BYTE, status.MPI_SOURCE, 0, failing, MPI_STATUS_IGNORE);
+            failed[static_cast<std::size_t>(status.MPI_SOURCE)] = true;
+            --alive;
+        }
+        if (alive == 0) MPI_Waitall(static_cast<int>(told.size()), told.data(), MPI_STATUSES_IGNORE);
+        return failed;
+    }
+
  private:
     struct Sent {
         std::vector<float> data;
@@ -155,21 +191,13 @@ MpiRun::~MpiRun() {
 Team& MpiRun::team() { return *members_; }
 
 void MpiRun::fail(int code, const std::function<void()>& say) {
-    using Clock = std::chrono::steady_clock;
-    constexpr auto patience = std::chrono::seconds(2);
-    MPI_Request all_are_here = MPI_REQUEST_NULL;
     members_->gave_up = true;
-    MPI_Ibarrier(members_->failing, &all_are_here);
-    int done = 0;
-    for (const auto begin = Clock::now(); !done && Clock::now() - begin < patience;) {
-        MPI_Test(&all_are_here, &done, MPI_STATUS_IGNORE);
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    if (done) {
-        if (members_->rank() == 0) say();
-        return;
-    }
-    say();
+    const std::vector<bool> failed = members_->meet_those_that_failed();
+    const auto first = std::find(failed.begin(), failed.end(), true) - failed.begin();
+    if (first == members_->rank()) say();
+    if (std::count(failed.begin(), failed.end(), false) == 0) return;
+    // The first has to have its say before somebody ends the run.
+    if (first != members_->rank()) std::this_thread::sleep_for(Members::patience);
     MPI_Abort(MPI_COMM_WORLD, code);
     std::abort();
 }

@@ -20,9 +20,9 @@ class MpiRun {
     /// All processes.
     Team& team();
 
-    /// To be called by a process that gives up: ends the run with this exit code. Where all fail, as they do
-    /// where all see the same fault, the first calls `say`, and all return from here, to end. Where one fails
-    /// for reasons of its own it calls `say`, takes the others down, and does not return.
+    /// To be called by a process that gives up: ends the run with this exit code. Of those that fail within
+    /// two seconds the first calls `say`. Where all do, as where all see the same fault, they return from
+    /// here, to end; otherwise they take the rest down, and do not return.
     void fail(int code, const std::function<void()>& say);
 
  private:

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <optional>
-#include <string>
 
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/run_together.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo {
@@ -20,14 +20,7 @@ using openvdb::CoordBBox;
 SurfacePart count(const DensityMap& part, float isovalue, const CoordBBox& own, Team& team,
                   const Progress& progress) {
     std::optional<SurfacePart> surface;
-    std::string refusal;
-    try {
-        surface.emplace(part, isovalue, own, progress);
-    } catch (const InvalidInput& error) {
-        refusal = error.what();
-    }
-    for (const std::vector<char>& said : team.gather({refusal.begin(), refusal.end()}))
-        if (!said.empty()) throw InvalidInput(std::string(said.begin(), said.end()));
+    run_together(team, [&] { surface.emplace(part, isovalue, own, progress); });
     return std::move(*surface);
 }
 

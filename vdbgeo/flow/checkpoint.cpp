@@ -10,6 +10,7 @@
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/file_hash.h"
+#include "vdbgeo/core/run_together.h"
 #include "vdbgeo/flow/state_file.h"
 
 namespace vdbgeo {
@@ -95,8 +96,6 @@ bool CheckpointedSolver::anyone(bool mine) const {
     return count[0] > 0;
 }
 
-void CheckpointedSolver::wait_for_all() const { anyone(false); }
-
 /// The newest first.
 std::vector<CheckpointedSolver::List> CheckpointedSolver::lists() const {
     std::vector<List> found;
@@ -180,28 +179,33 @@ void CheckpointedSolver::write() {
     list.folder = generation(list.number);
     list.key = key_;
     list.log = log_;
-    if (!team_ || team_->rank() == 0) {
+    const int rank = team_ ? team_->rank() : 0;
+    const auto together = [&](const std::function<void()>& step) {
+        team_ ? run_together(*team_, step) : step();
+    };
+    together([&] {
+        if (rank != 0) return;
         std::error_code error;
         fs::create_directories(list.folder, error);
         if (error)
             throw IoError(fmt::format("{}: cannot be made: {}", list.folder.string(), error.message()));
         clear_generation(list.folder);
-    }
-    wait_for_all();
-    const int rank = team_ ? team_->rank() : 0;
-    StateWriter writer(list.folder / state_name(rank), solver_.fields());
-    solver_.save(writer);
-    const std::string hash = writer.finish();
+    });
+    std::string hash;
+    together([&] {
+        StateWriter writer(list.folder / state_name(rank), solver_.fields());
+        solver_.save(writer);
+        hash = writer.finish();
+    });
     std::vector<std::vector<char>> hashes{{hash.begin(), hash.end()}};
     if (team_) hashes = team_->gather(hashes[0]);
     for (std::size_t r = 0; r < hashes.size(); ++r)
         list.files.emplace_back(state_name(static_cast<int>(r)),
                                 std::string(hashes[r].begin(), hashes[r].end()));
-    if (rank == 0) {
+    together([&] {
         const std::string text = list.text();
-        write_file(list.folder / list_name, text + "end " + text_hash(text) + "\n");
-    }
-    wait_for_all();
+        if (rank == 0) write_file(list.folder / list_name, text + "end " + text_hash(text) + "\n");
+    });
 }
 
 int with_checkpoints(CycleSolver& solver, const CheckpointOptions& options, const std::string& what,

@@ -49,7 +49,6 @@ class CheckpointedSolver : public CycleSolver {
     struct List;
 
     bool anyone(bool mine) const;
-    void wait_for_all() const;
     void resume();
     std::vector<List> lists() const;
     bool whole(const List& list) const;

@@ -72,21 +72,18 @@ BlockOptions BlockFilter::options() const {
     return out;
 }
 
-void BlockFilter::need_solver(const std::unique_ptr<BlockedDiffusion>& solver) const {
-    if (!solver) need_samples(flags_.in, Moments(), map_.statistics());
-}
+void BlockFilter::fail_empty() const { need_samples(flags_.in, Moments(), map_.statistics()); }
 
 FloatGrid::Ptr BlockFilter::changed(const CoordBBox& slab) const {
     FloatGrid::Ptr part = map_.read(slab).grid;
     if (part->tree().hasActiveTiles()) part->tree().voxelizeActiveTiles();
-    solver_->store(slab, part->tree());
+    store_(slab, part->tree());
     if (cleared_) clear_inactive(*part);
     return part;
 }
 
-void BlockFilter::finish(const BlockedDiffusion& solver, bool cleared, const std::string& history,
-                         const Progress& progress) {
-    solver_ = &solver;
+void BlockFilter::finish(Store store, bool cleared, const std::string& history, const Progress& progress) {
+    store_ = std::move(store);
     cleared_ = cleared;
     result_ = in().map;
     result_.grid = in().map.grid->copyWithNewTree();

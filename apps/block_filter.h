@@ -1,12 +1,12 @@
 // What commands share that make a map out of a map which does not fit into the memory that may be taken.
 #pragma once
 
-#include <memory>
+#include <functional>
 #include <string>
 
 #include "apps/map_filter.h"
 #include "converters/map_blocks.h"
-#include "vdbgeo/blocks/blocked_diffusion.h"
+#include "vdbgeo/blocks/blocked_map.h"
 
 namespace vdbgeo::app {
 
@@ -23,11 +23,12 @@ class BlockFilter {
     const MapFile& in() const { return map_.whole(); }
     MapSource source() const;
     BlockOptions options() const;
-    /// NumericalError where the solver is null: no sample is kept.
-    void need_solver(const std::unique_ptr<BlockedDiffusion>& solver) const;
-    /// Takes the solver's values for the map's. `cleared`: clear_inactive.
-    void finish(const BlockedDiffusion& solver, bool cleared, const std::string& history,
-                const Progress& progress);
+    /// NumericalError: no sample is kept.
+    void fail_empty() const;
+    /// Takes for the map's values those that `store` writes into the leaves of a part which begin in a box.
+    /// `cleared`: clear_inactive.
+    using Store = std::function<void(const openvdb::CoordBBox& box, openvdb::FloatTree& part)>;
+    void finish(Store store, bool cleared, const std::string& history, const Progress& progress);
     const Statistics& statistics() const { return result_.statistics; }
     /// Writes the map and puts what there is to say of the file into the result.
     void write(Json& result, Session& session) const;
@@ -38,7 +39,7 @@ class BlockFilter {
     const MapFilterFlags& flags_;
     MapBlocks map_;
     DensityMap result_;  // without voxels
-    const BlockedDiffusion* solver_ = nullptr;
+    Store store_;
     bool cleared_ = false;
 };
 

@@ -14,6 +14,7 @@
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "apps/team_filter.h"
+#include "vdbgeo/blocks/blocked_diffusion.h"
 #include "vdbgeo/flow/baselines.h"
 #include "vdbgeo/flow/noise.h"
 #include "vdbgeo/volume/map_statistics.h"
@@ -208,9 +209,10 @@ void run_denoise_in_blocks(const DenoiseOptions& o, Session& session) {
                                        session.stage("denoising"));
         });
     });
-    filter.need_solver(solver);
+    if (!solver) filter.fail_empty();
     const Outcome outcome = outcome_of(o, report);
-    filter.finish(*solver, false, fmt::format("denoised: {}, {}", o.method, outcome.history),
+    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
+                  false, fmt::format("denoised: {}, {}", o.method, outcome.history),
                   session.stage("statistics"));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, filter.in());

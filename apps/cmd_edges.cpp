@@ -9,6 +9,7 @@
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "apps/team_filter.h"
+#include "vdbgeo/blocks/blocked_diffusion.h"
 
 namespace vdbgeo::app {
 namespace {
@@ -72,8 +73,9 @@ void run_edges_in_blocks(const EdgesOptions& o, Session& session) {
             return coupled_high_pass_blocks(filter.source(), options, blocks, report, session.stage("edges"));
         });
     });
-    filter.need_solver(solver);
-    filter.finish(*solver, true, history_of(options, report), session.stage("statistics"));
+    if (!solver) filter.fail_empty();
+    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
+                  true, history_of(options, report), session.stage("statistics"));
     seconds["compute"] = clock.lap();
     Json j = result_of(o, filter.in(), report, filter.statistics());
     filter.write(j, session);

@@ -3,12 +3,15 @@
 
 #include <cmath>
 
+#include "apps/block_filter.h"
 #include "apps/command.h"
 #include "apps/flow_flags.h"
 #include "apps/map_filter.h"
 #include "apps/preview.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "apps/team_filter.h"
+#include "vdbgeo/blocks/blocked_flow.h"
 #include "vdbgeo/surface/level_set.h"
 
 namespace vdbgeo::app {
@@ -30,13 +33,17 @@ struct Run {
     Clock clock;
 };
 
-void write_moved(const FlowOptions& o, DensityMap& map, Run& run, Session& session) {
+void write_moved(const FlowOptions& o, FilterInput& input, const DensityMap& map, std::uint64_t bytes_sent,
+                 Run& run, Session& session) {
     run.seconds["compute"] = run.clock.lap();
     run.result.update(statistics_json(map.statistics));
     const bool shown = !o.files.preview.empty();
     if (shown) run.preview.add("after", map, Preview::Greys::as_first, session.stage("preview"));
     run.clock.lap();
-    write_filtered(o.files, map, run.result, session);
+    if (input.part)
+        write_filtered(o.files, input, bytes_sent, run.result, session);
+    else
+        write_filtered(o.files, map, run.result, session);
     run.seconds["write"] = run.clock.lap();
     if (shown) {
         run.preview.write(o.files.preview);
@@ -51,31 +58,72 @@ void start_preview(const FlowOptions& o, const DensityMap& map, Run& run, Sessio
     run.clock.lap();
 }
 
-void move_density(const FlowOptions& o, MapFile& in, Run& run, Session& session) {
+std::string settings_of(const GeometricFlowOptions& options) {
+    return fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order, options.fidelity,
+                       options.pressure, options.scale);
+}
+
+std::string history_of(const GeometricFlowOptions& options, const HyperdiffusionReport& r) {
+    return fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings_of(options), r.time, r.steps);
+}
+
+/// What was chosen and done.
+void add_flow(const GeometricFlowOptions& options, const HyperdiffusionReport& r, Json& result) {
+    result["flow"] = "density";
+    result.update({{"order", options.order},
+                   {"fidelity", options.fidelity},
+                   {"pressure", options.pressure},
+                   {"density_scale", options.scale}});
+    result.update(report_json(r));
+    result["removed"] = r.removed;
+}
+
+void say_flow(const GeometricFlowOptions& options, const HyperdiffusionReport& r, Session& session) {
+    if (session.json || session.quiet) return;
+    session.say(fmt::format("flow        of the density, {}", settings_of(options)));
+    session.say(fmt::format("time        {}", steps_text(r)));
+    session.say(fmt::format("removed     {:.4g} (root mean square)", r.removed));
+    session.say(fmt::format("voxels      {}", r.active_voxels));
+}
+
+void move_density(const FlowOptions& o, FilterInput& input, Run& run, Session& session) {
+    MapFile& in = input.in;
     need_density(o.files.in, in);
     start_preview(o, in.map, run, session);
     const GeometricFlowOptions& options = o.flow.density;
     const Progress progress = session.stage("flow");
-    const HyperdiffusionReport r =
-        naming(o.files.in, [&] { return geometric_flow(*in.map.grid, options, progress); });
-    const std::string settings =
-        fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order, options.fidelity,
-                    options.pressure, options.scale);
-    finish_map(in.map,
-               fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings, r.time, r.steps));
-    run.result["flow"] = "density";
-    run.result.update({{"order", options.order},
-                       {"fidelity", options.fidelity},
-                       {"pressure", options.pressure},
-                       {"density_scale", options.scale}});
-    run.result.update(report_json(r));
-    run.result["removed"] = r.removed;
-    write_moved(o, in.map, run, session);
-    if (session.json || session.quiet) return;
-    session.say(fmt::format("flow        of the density, {}", settings));
-    session.say(fmt::format("time        {}", steps_text(r)));
-    session.say(fmt::format("removed     {:.4g} (root mean square)", r.removed));
-    session.say(fmt::format("voxels      {}", r.active_voxels));
+    const HyperdiffusionReport r = naming(
+        o.files.in, [&] { return geometric_flow(*in.map.grid, options, progress, input.share()); });
+    finish_map(input, history_of(options, r));
+    add_flow(options, r, run.result);
+    write_moved(o, input, in.map, r.bytes_sent, run, session);
+    say_flow(options, r, session);
+}
+
+/// A map that does not fit into memory.
+void move_density_in_blocks(const FlowOptions& o, Session& session) {
+    const GeometricFlowOptions& options = o.flow.density;
+    Json seconds;
+    Clock clock;
+    BlockFilter filter(o.files, session);
+    need_density(o.files.in, filter.in());
+    seconds["read"] = clock.lap();
+    HyperdiffusionReport report;
+    const auto flow = naming(o.files.in, [&] {
+        return geometric_flow_blocks(filter.source(), options, filter.options(), report, session.stage("flow"));
+    });
+    if (!flow) filter.fail_empty();
+    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { flow->store(box, part); },
+                  false, history_of(options, report), session.stage("statistics"));
+    seconds["compute"] = clock.lap();
+    Json j = filter_result(o.files, filter.in());
+    add_flow(options, report, j);
+    j.update(statistics_json(filter.statistics()));
+    filter.write(j, session);
+    seconds["write"] = clock.lap();
+    j["seconds"] = seconds;
+    say_flow(options, report, session);
+    session.result(j);
 }
 
 /// The level set that is to move: the grid itself, or the one of an isosurface.
@@ -92,7 +140,8 @@ DensityMap surface_of(const FlowOptions& o, const MapFile& in, Json& result, Ses
     });
 }
 
-void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session) {
+void move_surface(const FlowOptions& o, FilterInput& input, Run& run, Session& session) {
+    MapFile& in = input.in;
     Json& j = run.result;
     j["flow"] = o.flow.surface_kind;
     DensityMap map = surface_of(o, in, j, session);
@@ -114,7 +163,7 @@ void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session)
               {"active_voxels", r.active_voxels},
               {"volume_before_A3", voxel * r.volume_before},
               {"volume_after_A3", voxel * r.volume_after}});
-    write_moved(o, map, run, session);
+    write_moved(o, input, map, 0, run, session);
     if (session.json || session.quiet) return;
     session.say(fmt::format("flow        {} of the surface{}", o.flow.surface_kind,
                             j.contains("iso") ? fmt::format(" at {:.6g}", j["iso"].get<double>()) : ""));
@@ -125,14 +174,17 @@ void move_surface(const FlowOptions& o, MapFile& in, Run& run, Session& session)
 }
 
 void run_flow(const FlowOptions& o, Session& session) {
+    const MemoryNeed need{"the flow", o.moves_surface() ? 4.2 : 16.2};
+    if (!o.moves_surface() && !session.team && o.files.preview.empty() && in_blocks(o.files, need))
+        return move_density_in_blocks(o, session);
     Run run;
-    MapFile in = read_for_filter(o.files, {"the flow", o.moves_surface() ? 4.2 : 16.2}, session);
+    FilterInput input = read_filter_input(o.files, need, geometric_flow_halo(o.flow.density), session);
     run.seconds["read"] = run.clock.lap();
-    run.result = filter_result(o.files, in);
+    run.result = filter_result(o.files, input.in);
     if (o.moves_surface())
-        move_surface(o, in, run, session);
+        move_surface(o, input, run, session);
     else
-        move_density(o, in, run, session);
+        move_density(o, input, run, session);
     session.result(run.result);
 }
 
@@ -158,7 +210,12 @@ Command flow_command() {
                     o->iso.parse();
                     if (!o->moves_surface() && o->iso_flag->count() > 0)
                         throw UsageError("--iso is for the flow of a surface: it goes with --surface");
-                    check_map_output(o->files.out, session);
+                    if (session.team && o->moves_surface())
+                        throw UsageError("--surface: a team moves densities; vdbgeo flow moves surfaces");
+                    if (session.team)
+                        check_team_output(o->files, session);
+                    else
+                        check_map_output(o->files.out, session);
                     run_flow(*o, session);
                 };
             }};

@@ -48,6 +48,10 @@ TEST_F(Mpi, FindsTheSameEdges) {
     expect_same({"edges", noisy(), "--order", "1", "--time", "0.2", "--threshold", "0.1"}, ".mrc", {2, 5});
 }
 
+TEST_F(Mpi, FlowsTheSame) {
+    expect_same({"flow", noisy(), "--time", "0.3", "--density-scale", "3", "--threshold", "0.1"}, ".mrc", {2, 5});
+}
+
 TEST_F(Mpi, TheTimeIsFoundTogether) {
     const std::string map = noisy();
     expect_same({"denoise", map, "--order", "1"}, ".mrc", {2});

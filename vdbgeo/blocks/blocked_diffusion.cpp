@@ -15,7 +15,6 @@
 #include "vdbgeo/stencil/tiles.h"
 
 namespace vdbgeo {
-namespace {
 
 using openvdb::Coord;
 using openvdb::CoordBBox;
@@ -24,20 +23,6 @@ using stencil::BlockField;
 using stencil::BlockLayout;
 using stencil::FieldTotal;
 using stencil::GradientTotal;
-
-constexpr double grid_bytes = 2400;  // a leaf of a grid, and its share of the tree
-
-/// Box of the cells that have to be computed so that values within `reach` of `own` come out right.
-CoordBBox computed(const CoordBBox& own, int reach) {
-    const auto down = [](int v, int size) { return (v >= 0 ? v / size : -((size - 1 - v) / size)) * size; };
-    CoordBBox box = own;
-    box.expand(reach);
-    box.min() = {down(box.min().x(), BlockLayout::size_x), down(box.min().y(), BlockLayout::size_y),
-                 down(box.min().z(), BlockLayout::size_z)};
-    return box;
-}
-
-}  // namespace
 
 /// Some steps of a cycle.
 struct BlockedDiffusion::Part {
@@ -73,69 +58,24 @@ struct BlockedDiffusion::Totals {
 BlockedDiffusion::BlockedDiffusion(MapSource source, std::vector<DiffusionProblem::Field> fields,
                                    const EdgeScale& sigma, const BlockOptions& options,
                                    const Progress& progress)
-    : source_(std::move(source)),
-      options_(options),
-      problem_(std::move(fields), sigma, axis_weights(*source_.transform)) {
-    find_mean(progress.part(0, 0.5));
-    if (before_.count > 0) find_edges(progress.part(0.5, 1));
-    summary_.assign(problem_.fields.size(), before_);
-}
-
-std::uint64_t BlockedDiffusion::memory_for_blocks() const {
-    const std::uint64_t index = index_.memory();
-    return options_.memory > index ? options_.memory - index : 0;
-}
-
-BlockPlan BlockedDiffusion::plan(const BlockWork& work, const BrickIndex* index) const {
-    if (!options_.size) return plan_blocks(source_.box, work, memory_for_blocks(), index);
-    const int steps = std::max(work.steps_a_sweep, std::min(work.steps, options_.steps.value_or(work.steps)));
-    return {*options_.size, steps, block_halo(work, steps, true, true),
-            blocks_of(source_.box, *options_.size, index)};
-}
-
-/// For going through X with one field in memory.
-BlockPlan BlockedDiffusion::reading_plan(int ghosts) const {
-    BlockWork work;
-    work.last_reach = ghosts;
-    work.bytes_a_brick = grid_bytes + BlockField::brick_size * sizeof(float) + 96;
-    return plan(work, index_.cells().empty() ? nullptr : &index_);
-}
-
-FloatGrid::Ptr BlockedDiffusion::read(const CoordBBox& box) const {
-    FloatGrid::Ptr grid = source_.read(box);
-    if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles();
-    return grid;
-}
-
-void BlockedDiffusion::find_mean(const Progress& progress) {
-    const BlockPlan plan = reading_plan(0);
-    FieldTotal total;
-    for (std::size_t i = 0; i < plan.blocks.size(); ++i) {
-        const CoordBBox& own = plan.blocks[i];
-        FloatGrid::Ptr grid = read(own);
-        const BlockLayout layout(grid->tree(), own);
-        BlockField x(layout.brick_count());
-        stencil::load(layout, grid->tree(), 0, x.brick(0));
-        total.add(layout, x.brick(0));
-        index_.add(layout);
-        progress.report(double(i + 1) / double(plan.blocks.size()));
-    }
-    index_.finish();
-    const stencil::FieldSummary given = total.summary();
-    check_finite(given);
+    : map_(std::move(source), options),
+      problem_(std::move(fields), sigma, axis_weights(*map_.source().transform)) {
+    const stencil::FieldSummary given = map_.survey(progress.part(0, 0.5));
     first_measure_.range = static_cast<double>(given.max) - given.min;
     offset_ = static_cast<float>(given.mean());
     before_.count = given.count;
+    if (before_.count > 0) find_edges(progress.part(0.5, 1));
+    summary_.assign(problem_.fields.size(), before_);
 }
 
 /// What the first cycle has to know of X less its mean.
 void BlockedDiffusion::find_edges(const Progress& progress) {
     Totals totals(problem_);
-    const BlockPlan plan = reading_plan(1);
+    const BlockPlan plan = map_.reading_plan(1);
     for (std::size_t i = 0; i < plan.blocks.size(); ++i) {
         CoordBBox box = plan.blocks[i];
         box.expand(plan.halo);
-        FloatGrid::Ptr grid = read(box);
+        const FloatGrid::Ptr grid = map_.read(box);
         const BlockLayout layout(grid->tree(), plan.blocks[i]);
         BlockField x(layout.brick_count());
         stencil::load(layout, grid->tree(), offset_, x.brick(0));
@@ -185,7 +125,7 @@ BlockWork BlockedDiffusion::work_of(Stepper stepper, int n) const {
 void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress& progress) {
     const auto sweeps = sweeps_of_cycle(stepper, n, tau, problem_.highest_order());
     const BlockWork work = work_of(stepper, n);
-    const BlockPlan plan = this->plan(work, &index_);
+    const BlockPlan plan = map_.plan(work);
     const auto a_part = static_cast<std::size_t>(std::max(1, plan.steps / work.steps_a_sweep));
     most_blocks_ = std::max(most_blocks_, plan.blocks.size());
     for (std::size_t first = 0; first < sweeps.size(); first += a_part) {
@@ -197,8 +137,8 @@ void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress&
                                                     double(plan.blocks.size());
             progress.report(done / double(sweeps.size()));
         }
-        for (Generations& g : now_) std::swap(g.now, g.next);
-        for (Generations& g : step_before_) std::swap(g.now, g.next);
+        for (BrickGenerations& g : now_) g.turn();
+        for (BrickGenerations& g : step_before_) g.turn();
         is_input_ = false;
         if (part.ends()) keep(totals);
     }
@@ -210,18 +150,18 @@ void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress&
 void BlockedDiffusion::take_part(const Part& part, const CoordBBox& own, Totals& totals) {
     CoordBBox box = own;
     box.expand(part.halo);
-    const BrickIndex::Part bricks = index_.part(box);
+    const BrickIndex::Part bricks = map_.index().part(box);
     DiffusionFields fields(problem_, BlockLayout(bricks.leaves, own));
     most_memory_ = std::max(most_memory_, fields.memory());
     load(part, bricks, box, fields);
     const int after = part.ends() ? part.work->last_reach : 0, reach = part.work->reach;
     BlockLayout& layout = fields.layout();
     if (part.begins()) {
-        layout.work_on(computed(own, part.steps_from(part.first) * reach + after));
+        layout.work_on(cells_within(own, part.steps_from(part.first) * reach + after));
         fields.freeze(measure_);
     }
     for (std::size_t s = part.first; s < part.last; ++s) {
-        layout.work_on(computed(own, part.steps_from(s + 1) * reach + after));
+        layout.work_on(cells_within(own, part.steps_from(s + 1) * reach + after));
         stencil::SweepPlan plan = fields.plan((*part.sweeps)[s]);
         sweep(layout, plan);
     }
@@ -234,9 +174,9 @@ void BlockedDiffusion::take_part(const Part& part, const CoordBBox& own, Totals&
 void BlockedDiffusion::load(const Part& part, const BrickIndex::Part& bricks, const CoordBBox& box,
                             DiffusionFields& fields) const {
     if (is_input_) {
-        fields.load(read(box)->tree(), offset_);
+        fields.load(map_.read(box)->tree(), offset_);
     } else {
-        if (fields.has_input()) fields.load_input(read(box)->tree(), offset_);
+        if (fields.has_input()) fields.load_input(map_.read(box)->tree(), offset_);
         for (std::size_t f = 0; f < now_.size(); ++f) now_[f].now->read(bricks.runs, fields.now(f));
     }
     malloc_trim(0);  // what the grid took goes back before the fields take theirs
@@ -251,21 +191,22 @@ void BlockedDiffusion::load(const Part& part, const BrickIndex::Part& bricks, co
 void BlockedDiffusion::put_down(const Part& part, const BrickIndex::Part& bricks, const CoordBBox& own,
                                 DiffusionFields& fields) {
     const std::vector<BrickIndex::Run> runs = BrickIndex::within(bricks, own);
-    const auto put = [&](std::unique_ptr<BrickFile>& file, const float* field) {
-        if (!file) file = std::make_unique<BrickFile>(options_.scratch);
-        file->write(runs, field);
-    };
+    const std::filesystem::path& scratch = map_.options().scratch;
     now_.resize(problem_.fields.size());
-    for (std::size_t f = 0; f < now_.size(); ++f) put(now_[f].next, fields.now(f));
+    for (std::size_t f = 0; f < now_.size(); ++f) next_of(now_[f], scratch).write(runs, fields.now(f));
     if (part.ends()) return;
     if (!(*part.sweeps)[part.last - 1].ends) {
         step_before_.resize(problem_.fields.size());
-        for (std::size_t f = 0; f < step_before_.size(); ++f) put(step_before_[f].next, fields.before(f));
+        for (std::size_t f = 0; f < step_before_.size(); ++f) 
+            next_of(step_before_[f], scratch).write(runs, fields.before(f));
     }
     if (!part.begins()) return;
     const std::vector<float*> d = fields.coefficients();
     coefficients_.resize(d.size());
-    for (std::size_t i = 0; i < d.size(); ++i) put(coefficients_[i], d[i]);
+    for (std::size_t i = 0; i < d.size(); ++i) {
+        if (!coefficients_[i]) coefficients_[i] = std::make_unique<BrickFile>(scratch);
+        coefficients_[i]->write(runs, d[i]);
+    }
 }
 
 void BlockedDiffusion::reset() {
@@ -275,20 +216,7 @@ void BlockedDiffusion::reset() {
 }
 
 double BlockedDiffusion::removed() {
-    if (is_input_) return 0;
-    stencil::CellTotal<double> total(0.0, [](double& sum, const double& more) { sum += more; });
-    for (const CoordBBox& own : reading_plan(0).blocks) {
-        const FloatGrid::Ptr x = read(own);
-        const BrickIndex::Part bricks = index_.part(own);
-        const BlockLayout layout(bricks.leaves, own);
-        BlockField u(layout.brick_count());
-        now_[0].now->read(bricks.runs, u.brick(0));
-        total.add(layout, stencil::sum_by_cell(layout, 0.0, [&](std::size_t b, double& sum) {
-                      const float* of_x = x->tree().probeConstLeaf(layout.origin(b))->buffer().data();
-                      add_removed(of_x, offset_, u.brick(b), layout.mask(b), sum);
-                  }));
-    }
-    return std::sqrt(total.total() / std::max(1.0, static_cast<double>(active_voxels())));
+    return is_input_ ? 0 : map_.removed(*now_[0].now, offset_, active_voxels());
 }
 
 /// For what goes through all fields, a block at a time.
@@ -296,16 +224,16 @@ BlockPlan BlockedDiffusion::copying_plan(int ghosts) const {
     BlockWork work;
     work.last_reach = ghosts;
     work.bytes_a_brick = static_cast<double>(problem_.fields.size()) * 2048 + 96;
-    return plan(work, &index_);
+    return map_.plan(work);
 }
 
 void BlockedDiffusion::save(StateWriter& writer) {
     for (const CoordBBox& own : copying_plan(0).blocks) {
-        const BrickIndex::Part bricks = index_.part(own);
+        const BrickIndex::Part bricks = map_.index().part(own);
         const BlockLayout layout(bricks.leaves, own);
         std::vector<BlockField> fields;
         std::vector<const float*> now;
-        for (const Generations& g : now_) {
+        for (const BrickGenerations& g : now_) {
             fields.emplace_back(layout.brick_count());
             g.now->read(bricks.runs, fields.back().brick(0));
             now.push_back(fields.back().brick(0));
@@ -318,12 +246,12 @@ void BlockedDiffusion::load(const StateReader& reader) {
     const BlockPlan plan = copying_plan(1);
     Totals totals(problem_);
     now_.resize(problem_.fields.size());
-    for (Generations& g : now_)
-        if (!g.now) g.now = std::make_unique<BrickFile>(options_.scratch);
+    for (BrickGenerations& g : now_)
+        if (!g.now) g.now = std::make_unique<BrickFile>(map_.options().scratch);
     for (const CoordBBox& own : plan.blocks) {
         CoordBBox box = own;
         box.expand(plan.halo);
-        const BrickIndex::Part bricks = index_.part(box);
+        const BrickIndex::Part bricks = map_.index().part(box);
         const BlockLayout layout(bricks.leaves, own);
         std::vector<BlockField> fields;
         std::vector<float*> now;
@@ -345,14 +273,14 @@ void BlockedDiffusion::describe(HyperdiffusionReport& report) {
     report.active_voxels = active_voxels();
     report.mean_before = before_.mean() + offset_;
     report.mean_after = summary_[0].mean() + offset_;
-    report.state_bytes = most_memory_ + index_.memory();
+    report.state_bytes = most_memory_ + map_.index().memory();
     report.removed = removed();
     report.blocks = most_blocks_;
 }
 
 void BlockedDiffusion::store(const CoordBBox& box, openvdb::FloatTree& part) const {
     if (is_input_ && problem_.fields.size() == 1) return;
-    const BrickIndex::Part bricks = index_.part(box);
+    const BrickIndex::Part bricks = map_.index().part(box);
     const BlockLayout layout(bricks.leaves);
     BlockField u(layout.brick_count());
     float offset = offset_;

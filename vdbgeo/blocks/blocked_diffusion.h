@@ -9,31 +9,13 @@
 #include <optional>
 #include <vector>
 
-#include "vdbgeo/blocks/block_plan.h"
-#include "vdbgeo/blocks/brick_index.h"
+#include "vdbgeo/blocks/blocked_map.h"
 #include "vdbgeo/flow/coupled_high_pass.h"
 #include "vdbgeo/flow/cycles.h"
 #include "vdbgeo/flow/diffusion_fields.h"
 #include "vdbgeo/stencil/block_field.h"
 
 namespace vdbgeo {
-
-/// A map that is read in parts, as often as they are wanted.
-struct MapSource {
-    openvdb::CoordBBox box;  ///< holds all leaves
-    openvdb::math::Transform::ConstPtr transform;
-    /// The leaves and tiles that reach into a box, with the values, masks and background of the whole.
-    std::function<openvdb::FloatGrid::Ptr(const openvdb::CoordBBox& wanted)> read;
-};
-
-struct BlockOptions {
-    std::uint64_t memory = 0;       ///< bytes that may be taken for the blocks
-    std::filesystem::path scratch;  ///< folder of temporary files
-    /// Blocks of this size (at multiples of 32, 32 and 128 voxels) and so many steps; unset: as memory goes.
-    std::optional<openvdb::Coord> size;
-    std::optional<int> steps;
-    CheckpointOptions checkpoint;
-};
 
 /// The same values as DiffusionSolver's, to the bit, whatever the blocks. A block is read with so many ghosts
 /// that all steps of a cycle, or some of them, can be taken in it: ghosts lose a rim of q+1 voxels a step.
@@ -65,20 +47,11 @@ class BlockedDiffusion : public CycleSolver {
     void store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const;
 
  private:
-    /// A field in files: what it was, and what it becomes.
-    struct Generations {
-        std::unique_ptr<BrickFile> now, next;
-    };
     struct Totals;
     struct Part;
 
-    std::uint64_t memory_for_blocks() const;
-    BlockPlan plan(const BlockWork& work, const BrickIndex* index) const;
-    BlockPlan reading_plan(int ghosts) const;
     BlockPlan copying_plan(int ghosts) const;
     BlockWork work_of(Stepper stepper, int n) const;
-    openvdb::FloatGrid::Ptr read(const openvdb::CoordBBox& box) const;
-    void find_mean(const Progress& progress);
     void find_edges(const Progress& progress);
     void take_part(const Part& part, const openvdb::CoordBBox& own, Totals& totals);
     void load(const Part& part, const BrickIndex::Part& bricks, const openvdb::CoordBBox& box,
@@ -87,11 +60,9 @@ class BlockedDiffusion : public CycleSolver {
                   DiffusionFields& fields);
     void keep(const Totals& totals);
 
-    MapSource source_;
-    BlockOptions options_;
+    BlockedMap map_;
     DiffusionProblem problem_;
-    BrickIndex index_;
-    std::vector<Generations> now_, step_before_;  // by field
+    std::vector<BrickGenerations> now_, step_before_;  // by field
     std::vector<std::unique_ptr<BrickFile>> coefficients_;
     bool is_input_ = true;  // u = X: nothing is in the files
     stencil::FieldSummary before_;

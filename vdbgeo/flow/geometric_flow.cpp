@@ -3,14 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <mutex>
-#include <vector>
+#include <memory>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
-#include "vdbgeo/stencil/tiles.h"
+#include "vdbgeo/flow/diffusion_solver.h"
+#include "vdbgeo/flow/flow_steps.h"
+#include "vdbgeo/flow/geometric_rate.h"
+#include "vdbgeo/stencil/ghost_exchange.h"
 
 namespace vdbgeo {
 namespace {
@@ -18,188 +19,25 @@ namespace {
 using openvdb::FloatGrid;
 using stencil::BlockField;
 using stencil::BlockLayout;
-using stencil::Tile;
 
 constexpr int max_order = 7;
-constexpr double safety = 0.9;
-constexpr int sizes[3] = {BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z};
 
-/// body(at, n) for the rows of the cell, grown by `before` and `after` voxels along each axis: n voxels from
-/// `at`.
-template <class Body>
-void for_rows(const Tile& t, const std::array<int, 3>& before, const std::array<int, 3>& after,
-              const Body& body) {
-    for (int x = -before[0]; x < sizes[0] + after[0]; ++x)
-        for (int y = -before[1]; y < sizes[1] + after[1]; ++y) {
-            const stencil::RowSpan s = t.span(x, y);
-            const int begin = std::max<int>(s.begin, -before[2]),
-                      end = std::min<int>(s.end, sizes[2] + after[2]);
-            if (begin < end) body(t.at(x, y, begin), static_cast<std::ptrdiff_t>(end - begin));
-        }
-}
-
-std::array<int, 3> all_axes(int n) { return {n, n, n}; }
-std::array<int, 3> one_axis(int a) { return {a == 0, a == 1, a == 2}; }
-std::array<int, 3> other_axes(int a) { return {a != 0, a != 1, a != 2}; }
-
-/// The right side of Eq 5 in a tile. Its scratch: w and another (L^q S), ∂w along the axes, coefficients of
-/// faces, √g, sums of coefficients.
-class RightSide {
- public:
-    static constexpr int scratch = 8;
-
-    RightSide(const GeometricFlowOptions& options, const Vec3d& weights) : order_(options.order) {
-        for (std::size_t a = 0; a < 3; ++a) {
-            weight_[a] = static_cast<float>(weights[static_cast<int>(a)]);
-            root_[a] = std::sqrt(weight_[a]);
-        }
-        per_scale_ = static_cast<float>(1 / options.scale);
-        fidelity_ = static_cast<float>(options.fidelity);
-        pressure_ = static_cast<float>(options.pressure);
-    }
-
-    /// out = S_t. Returns the largest row sum √g Σ w/√g over the faces of a voxel.
-    double operator()(Tile& t) const {
-        const std::ptrdiff_t steps[3] = {t.stride_x, t.stride_y, 1};
-        const float* w = power(t, steps);
-        float *faces = t.scratch[5], *root_g = t.scratch[6], *sums = t.scratch[7], *out = t.out[0];
-        for (std::size_t a = 0; a < 3; ++a) slope(t, w, a, steps[a]);
-        area_element(t, root_g);
-        for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            std::fill_n(sums + at, n, 0.0f);
-            std::fill_n(out + at, n, 0.0f);
-        });
-        for (std::size_t a = 0; a < 3; ++a) {
-            face_coefficients(t, w, a, steps[a], faces);
-            const std::ptrdiff_t s = steps[a];
-            for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-                for (std::ptrdiff_t i = at; i < at + n; ++i) {
-                    out[i] += faces[i] * (w[i + s] - w[i]) - faces[i - s] * (w[i] - w[i - s]);
-                    sums[i] += faces[i] + faces[i - s];
-                }
-            });
-        }
-        float most = 0;
-        for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            for (std::ptrdiff_t i = at; i < at + n; ++i) {
-                out[i] *= root_g[i];
-                most = std::max(most, sums[i] * root_g[i]);
-            }
-        });
-        add_pressure(t, steps, out);
-        for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            for (std::ptrdiff_t i = at; i < at + n; ++i) out[i] *= t.active[i];
-        });
-        return most;
-    }
-
- private:
-    /// w = L^q S, on the cell and one voxel around it.
-    const float* power(Tile& t, const std::ptrdiff_t* steps) const {
-        const float* from = t.in[0];
-        for (int q = 0; q < order_; ++q) {
-            float* to = t.scratch[static_cast<std::size_t>(q & 1)];
-            const std::array<int, 3> around = all_axes(order_ - q);
-            for_rows(t, around, around, [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-                const float* on = t.active;
-                for (std::ptrdiff_t i = at; i < at + n; ++i) {
-                    float sum = 0;
-                    for (std::size_t a = 0; a < 3; ++a) {
-                        const std::ptrdiff_t s = steps[a];
-                        sum += weight_[a] *
-                               (on[i - s] * (from[i] - from[i - s]) + on[i + s] * (from[i] - from[i + s]));
-                    }
-                    to[i] = on[i] * sum;
-                }
-            });
-            from = to;
-        }
-        return from;
-    }
-
-    /// Central difference of w along an axis, in units of the scale: in the cell and beside it along the
-    /// others.
-    void slope(Tile& t, const float* w, std::size_t a, std::ptrdiff_t s) const {
-        float* to = t.scratch[2 + a];
-        const float* on = t.active;
-        const float half = 0.5f * root_[a] * per_scale_;
-        const std::array<int, 3> around = other_axes(static_cast<int>(a));
-        for_rows(t, around, around, [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            for (std::ptrdiff_t i = at; i < at + n; ++i)
-                to[i] = half * (on[i + s] * (w[i + s] - w[i]) + on[i - s] * (w[i] - w[i - s]));
-        });
-    }
-
-    void area_element(Tile& t, float* root_g) const {
-        const float *x = t.scratch[2], *y = t.scratch[3], *z = t.scratch[4];
-        for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            for (std::ptrdiff_t i = at; i < at + n; ++i)
-                root_g[i] = std::sqrt(1 + x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
-        });
-    }
-
-    /// weight/√g of the face between a voxel and the next along the axis, 0 where one of them is not active.
-    void face_coefficients(Tile& t, const float* w, std::size_t a, std::ptrdiff_t s, float* faces) const {
-        const float *p = t.scratch[2 + (a + 1) % 3], *q = t.scratch[2 + (a + 2) % 3], *on = t.active;
-        const float normal = root_[a] * per_scale_;
-        // A row's span may begin behind the face that the row shares with the one before: faces are 0 there.
-        const std::array<int, 3> before = one_axis(static_cast<int>(a));
-        for (int x = -before[0]; x < sizes[0]; ++x)
-            for (int y = -before[1]; y < sizes[1]; ++y) {
-                const std::ptrdiff_t row = t.at(x, y, 0);
-                for (std::ptrdiff_t i = row - before[2]; i < row + sizes[2]; ++i) {
-                    const float both = on[i] * on[i + s];
-                    const float d = both * normal * (w[i + s] - w[i]);
-                    const float u = both * 0.5f * (p[i] + p[i + s]), v = both * 0.5f * (q[i] + q[i + s]);
-                    faces[i] = both * weight_[a] / std::sqrt(1 + d * d + u * u + v * v);
-                }
-            }
-    }
-
-    /// p |∇S| by Godunov's upwind differences, β (X − S).
-    void add_pressure(Tile& t, const std::ptrdiff_t* steps, float* out) const {
-        const float *in = t.in[0], *on = t.active;
-        if (pressure_ != 0) {
-            const float sign = pressure_ > 0 ? 1.0f : -1.0f;  // upward: from larger neighbours
-            for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-                for (std::ptrdiff_t i = at; i < at + n; ++i) {
-                    float sum = 0;
-                    for (std::size_t a = 0; a < 3; ++a) {
-                        const std::ptrdiff_t s = steps[a];
-                        const float next = sign * on[i + s] * (in[i + s] - in[i]);
-                        const float last = sign * on[i - s] * (in[i - s] - in[i]);
-                        const float up = std::max(0.0f, std::max(next, last));
-                        sum += weight_[a] * up * up;
-                    }
-                    out[i] += pressure_ * std::sqrt(sum);
-                }
-            });
-        }
-        if (fidelity_ == 0) return;
-        const float* target = t.in[1];
-        for_rows(t, all_axes(0), all_axes(0), [&](std::ptrdiff_t at, std::ptrdiff_t n) {
-            for (std::ptrdiff_t i = at; i < at + n; ++i) out[i] += fidelity_ * (target[i] - in[i]);
-        });
-    }
-
-    int order_;
-    std::array<float, 3> weight_, root_;
-    float per_scale_, fidelity_, pressure_;
-};
-
-class Flow {
+/// All of a map in memory, or a member's part.
+class Flow : public FlowSteps {
  public:
     Flow(const BlockLayout& layout, const openvdb::FloatTree& tree, const Vec3d& weights,
-         const GeometricFlowOptions& options)
+         const GeometricFlowOptions& options, const stencil::Share* share)
         : layout_(layout),
-          options_(options),
-          weights_(weights),
-          right_side_(options, weights),
+          rate_of_(options, weights),
+          share_(share),
           state_(layout.brick_count()),
           rate_(layout.brick_count()),
           input_(layout.brick_count()) {
+        if (share) ghosts_ = std::make_unique<stencil::GhostExchange>(layout, *share);
         stencil::load(layout, tree, 0, input_.brick(0));
-        std::copy_n(input_.brick(0), layout.brick_count() * BlockField::brick_size, state_.brick(0));
+        const std::size_t values = layout.brick_count() * BlockField::brick_size;
+        std::copy_n(input_.brick(0), values, state_.brick(0));
+        std::fill_n(rate_.brick(0), values, 0.0f);  // those of ghosts are never found
     }
 
     const float* state() const { return state_.brick(0); }
@@ -207,46 +45,33 @@ class Flow {
     std::size_t memory() const {
         return state_.memory() + rate_.memory() + input_.memory() + layout_.memory();
     }
+    std::uint64_t bytes_sent() const { return ghosts_ ? ghosts_->bytes_sent() : 0; }
 
-    /// A step of at most `left`; returns its length.
-    double step(double left) {
-        const double bound = 2 / find_rate();
-        if (options_.dt && *options_.dt > bound)
-            throw InvalidInput(fmt::format("the step {} is above the bound of the geometric flow, {:.6g}",
-                                           *options_.dt, bound));
-        const double dt = std::min(left, options_.dt.value_or(safety * bound));
+    double bound() override {
+        const double mine = rate_of_(layout_, state(), input(), rate_.brick(0));
+        double most = mine;
+        if (team())
+            for (const double other : gather_all(*team(), std::vector<double>{mine}))
+                most = std::max(most, other);
+        return rate_of_.bound(most);
+    }
+    stencil::FieldSummary take(double dt) override {
         const auto factor = static_cast<float>(dt);
         float* s = state_.brick(0);
         const float* r = rate_.brick(0);
         parallel_for(layout_.brick_count() * BlockField::brick_size, 1 << 14,
                      [=](std::size_t i) { s[i] += factor * r[i]; });
-        return dt;
+        if (ghosts_) ghosts_->run({s});
+        return stencil::summarize(layout_, state(), team());
     }
 
  private:
-    /// S_t, and the rate that Gershgorin's circles bound the operator's spectrum by.
-    double find_rate() {
-        stencil::TileFields fields;
-        fields.in = {state_.brick(0)};
-        if (options_.fidelity != 0) fields.in.push_back(input_.brick(0));
-        fields.out = {rate_.brick(0)};
-        fields.halo = options_.order + 1;
-        fields.scratch = RightSide::scratch;
-        std::mutex mutex;
-        double most = 0;
-        stencil::for_each_tile(layout_, fields, [&](Tile& t) {
-            const double here = right_side_(t);
-            const std::lock_guard<std::mutex> lock(mutex);
-            most = std::max(most, here);
-        });
-        return 2 * most * std::pow(4 * weights_.sum(), options_.order) + options_.fidelity +
-               2 * std::abs(options_.pressure) * std::sqrt(weights_.sum());
-    }
+    Team* team() const { return share_ ? share_->team : nullptr; }
 
     const BlockLayout& layout_;
-    const GeometricFlowOptions& options_;
-    Vec3d weights_;
-    RightSide right_side_;
+    GeometricRate rate_of_;
+    const stencil::Share* share_;
+    std::unique_ptr<stencil::GhostExchange> ghosts_;
     BlockField state_, rate_, input_;
 };
 
@@ -266,38 +91,53 @@ void GeometricFlowOptions::check() const {
         throw InvalidInput(fmt::format("the scale of a flow is {}, not above 0", scale));
 }
 
-HyperdiffusionReport geometric_flow(FloatGrid& grid, const GeometricFlowOptions& options,
-                                    const Progress& progress) {
-    options.check();
-    HyperdiffusionReport report;
-    report.active_voxels = grid.activeVoxelCount();
-    if (report.active_voxels == 0) return report;
-    const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree());
-    tree->voxelizeActiveTiles();
-    const BlockLayout layout(*tree);
-    Flow flow(layout, *tree, axis_weights(grid.transform()), options);
-    report.state_bytes = flow.memory();
-    const stencil::FieldSummary before = stencil::summarize(layout, flow.input());
-    if (before.non_finite > 0)
-        throw InvalidInput(fmt::format("{} values of the grid are not finite", before.non_finite));
-    report.mean_before = report.mean_after = before.mean();
-    if (options.time == 0) return report;
+int geometric_flow_halo(const GeometricFlowOptions& options) { return (options.order + 8) / 8 * 8; }
 
+void take_flow_steps(FlowSteps& flow, const stencil::FieldSummary& before, const GeometricFlowOptions& options,
+                     HyperdiffusionReport& report, const Progress& progress) {
+    constexpr double safety = 0.9;
+    report.mean_before = report.mean_after = before.mean();
     const double range = std::max(static_cast<double>(before.max) - before.min, 1e-30);
     while (options.time - report.time > 1e-9 * options.time) {
-        const double dt = flow.step(options.time - report.time);
+        const double bound = flow.bound();
+        if (options.dt && *options.dt > bound)
+            throw InvalidInput(fmt::format("the step {} is above the bound of the geometric flow, {:.6g}",
+                                           *options.dt, bound));
+        const double dt = std::min(options.time - report.time, options.dt.value_or(safety * bound));
+        const stencil::FieldSummary now = flow.take(dt);
         report.time += dt;
         report.dt = std::max(report.dt, dt);
         ++report.steps;
-        const stencil::FieldSummary now = stencil::summarize(layout, flow.state());
         const bool grew = options.pressure == 0 && static_cast<double>(now.max) - now.min > 1e3 * range;
         if (now.non_finite > 0 || grew)
             throw NumericalError(fmt::format("the geometric flow diverged at time {:.6g}", report.time));
         report.mean_after = now.mean();
         progress.report(report.time / options.time);
     }
-    report.removed = std::sqrt(stencil::squared_distance(layout, flow.input(), flow.state()) /
+}
+
+HyperdiffusionReport geometric_flow(FloatGrid& grid, const GeometricFlowOptions& options,
+                                    const Progress& progress, const stencil::Share* share) {
+    options.check();
+    check_halo(share, geometric_flow_halo(options));
+    HyperdiffusionReport report;
+    if (!share && grid.activeVoxelCount() == 0) return report;
+    Team* const team = share ? share->team : nullptr;
+    const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree());
+    tree->voxelizeActiveTiles();
+    const BlockLayout layout(*tree, share ? std::optional(share->own()) : std::nullopt);
+    Flow flow(layout, *tree, axis_weights(grid.transform()), options, share);
+    report.state_bytes = flow.memory();
+    const stencil::FieldSummary before = stencil::summarize(layout, flow.input(), team);
+    report.active_voxels = before.count + before.non_finite;
+    if (report.active_voxels == 0) return report;
+    if (before.non_finite > 0)
+        throw InvalidInput(fmt::format("{} values of the grid are not finite", before.non_finite));
+    take_flow_steps(flow, before, options, report, progress);
+    if (report.steps == 0) return report;
+    report.removed = std::sqrt(stencil::squared_distance(layout, flow.input(), flow.state(), team) /
                                static_cast<double>(report.active_voxels));
+    report.bytes_sent = flow.bytes_sent();
     stencil::store(layout, flow.state(), 0, *tree);
     grid.setTree(tree);
     progress.report(1);

@@ -25,7 +25,11 @@ struct GeometricFlowOptions {
 /// Gershgorin's circles 2 √g_i Σ_faces w/√g_face, λ = 4 Σ w. It is found in every step; steep places make it
 /// small, a larger `scale` makes it large. A `dt` that comes to be above it is refused. The report's dt is
 /// the longest step. Σ S is not kept. Errors as hyperdiffuse. Memory: 12 bytes a voxel of active leaves.
+/// `share`: as for hyperdiffuse, with the halo that geometric_flow_halo tells.
 HyperdiffusionReport geometric_flow(openvdb::FloatGrid& grid, const GeometricFlowOptions& options = {},
-                                    const Progress& progress = {});
+                                    const Progress& progress = {}, const stencil::Share* share = nullptr);
+
+/// Voxels that a part needs around its own.
+int geometric_flow_halo(const GeometricFlowOptions& options);
 
 }  // namespace vdbgeo

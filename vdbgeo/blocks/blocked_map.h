@@ -1,0 +1,77 @@
+// A map that does not fit into memory: read block by block, its fields in files.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "vdbgeo/blocks/block_plan.h"
+#include "vdbgeo/blocks/brick_index.h"
+#include "vdbgeo/core/progress.h"
+#include "vdbgeo/flow/checkpoint_options.h"
+#include "vdbgeo/stencil/block_field.h"
+
+namespace vdbgeo {
+
+/// A map that is read in parts, as often as they are wanted.
+struct MapSource {
+    openvdb::CoordBBox box;  ///< holds all leaves
+    openvdb::math::Transform::ConstPtr transform;
+    /// The leaves and tiles that reach into a box, with the values, masks and background of the whole.
+    std::function<openvdb::FloatGrid::Ptr(const openvdb::CoordBBox& wanted)> read;
+};
+
+struct BlockOptions {
+    std::uint64_t memory = 0;       ///< bytes that may be taken for the blocks
+    std::filesystem::path scratch;  ///< folder of temporary files
+    /// Blocks of this size (at multiples of 32, 32 and 128 voxels) and so many steps; unset: as memory goes.
+    std::optional<openvdb::Coord> size;
+    std::optional<int> steps;
+    CheckpointOptions checkpoint;
+};
+
+/// What those share who go through such a map.
+class BlockedMap {
+ public:
+    BlockedMap(MapSource source, const BlockOptions& options)
+        : source_(std::move(source)), options_(options) {}
+
+    const MapSource& source() const { return source_; }
+    const BlockOptions& options() const { return options_; }
+    const BrickIndex& index() const { return index_; }
+
+    /// Goes through the map once: finds its leaves, and what it holds. InvalidInput for values that are not
+    /// finite.
+    stencil::FieldSummary survey(const Progress& progress);
+    /// The leaves that reach into a box; active tiles as leaves.
+    openvdb::FloatGrid::Ptr read(const openvdb::CoordBBox& box) const;
+    /// Blocks for some work, in what is left of the memory.
+    BlockPlan plan(const BlockWork& work) const;
+    /// Blocks in which X is read, and this many fields are in memory.
+    BlockPlan reading_plan(int ghosts, int fields = 1) const;
+    /// The root mean square of X − offset − u over the active voxels, of which there are so many.
+    double removed(const BrickFile& u, float offset, std::uint64_t active) const;
+
+ private:
+    MapSource source_;
+    BlockOptions options_;
+    BrickIndex index_;
+};
+
+/// A field in files: what it was, and what it becomes.
+struct BrickGenerations {
+    std::unique_ptr<BrickFile> now, next;
+    void turn() { std::swap(now, next); }
+};
+
+/// What next values are written to; made where it is not there.
+BrickFile& next_of(BrickGenerations& field, const std::filesystem::path& scratch);
+
+/// Box of the cells that have to be computed so that values within `reach` of `own` come out right.
+openvdb::CoordBBox cells_within(const openvdb::CoordBBox& own, int reach);
+
+}  // namespace vdbgeo

@@ -1,8 +1,10 @@
 #include "apps/block_filter.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "apps/map_output.h"
+#include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/leaf_source.h"
 #include "converters/map_parts.h"
@@ -82,7 +84,7 @@ FloatGrid::Ptr BlockFilter::changed(const CoordBBox& slab) const {
     return part;
 }
 
-void BlockFilter::finish(Store store, bool cleared, const std::string& history, const Progress& progress) {
+void BlockFilter::finish(Store store, bool cleared, const std::string& history) {
     store_ = std::move(store);
     cleared_ = cleared;
     result_ = in().map;
@@ -90,8 +92,12 @@ void BlockFilter::finish(Store store, bool cleared, const std::string& history, 
     // Shared: a copy of a transform rounds its scale.
     result_.grid->setTransform(in().map.grid->transformPtr());
     if (cleared) clear_inactive(*result_.grid);
+    note_new_values(result_, history);
+}
+
+/// Slabs along z hold whole lines of leaves along x.
+Statistics BlockFilter::statistics_by_slabs(const Progress& progress) const {
     StatisticsOfParts all(result_.frame);
-    // Whole rows of leaves along x and y, so that the lines along x are whole.
     CoordBBox slab = map_.box();
     const int begin = slab.min().z() / leaf::dim * leaf::dim, end = slab.max().z();
     for (int z = begin; z <= end; z += leaf::dim) {
@@ -100,31 +106,46 @@ void BlockFilter::finish(Store store, bool cleared, const std::string& history, 
         all.add(*changed(slab), slab);
         progress.report(double(z - begin + leaf::dim) / double(end - begin + leaf::dim));
     }
-    result_.statistics = all.statistics(result_.grid->background());
-    note_new_values(result_, history);
+    return all.statistics(result_.grid->background());
 }
 
-void BlockFilter::write(Json& result, Session& session) const {
-    const Progress progress = session.stage("writing");
+void BlockFilter::write(Json& result, Session& session) {
+    const bool vdb = has_ending(flags_.out, ".vdb");
     LeafSource leaves;
     leaves.frame = result_.frame;
     leaves.meta = static_cast<const openvdb::MetaMap&>(*result_.grid);
     leaves.transform = result_.grid->constTransformPtr();
     leaves.background = result_.grid->background();
     leaves.active_box = map_.box();
-    const bool vdb = has_ending(flags_.out, ".vdb");
     const int axis = vdb ? 2 : recall_mrc_metadata(leaves.meta).order[2];
-    leaves.finder =
-        slab_finder(axis, map_.box(), [this](const CoordBBox& slab) { return changed(slab); });
-    if (!vdb) {
-        const MrcWriteReport report = write_mrc(leaves, flags_.out, flags_.mrc, progress);
-        session.end_stage();
-        report_written(flags_.out, report, result, session);
-        return;
+    // Statistics are found on the way where slabs lie along z; some outputs ask for a slab more than once.
+    StatisticsOfParts all(result_.frame);
+    int next = map_.box().min().z() / leaf::dim * leaf::dim;
+    leaves.finder = slab_finder(axis, map_.box(), [&](const CoordBBox& slab) {
+        FloatGrid::Ptr part = changed(slab);
+        if (axis == 2 && slab.min().z() == next) {
+            all.add(*part, slab);
+            next += leaf::dim;
+        }
+        return part;
+    });
+    leaves.finish_meta = [&](openvdb::MetaMap& meta) {
+        result_.statistics = all.statistics(leaves.background);
+        store_frame(result_);
+        meta = *result_.grid;
+    };
+    std::optional<MrcWriteReport> report;
+    const Progress progress = session.stage("writing");
+    if (vdb) {
+        write_vdb(leaves, flags_.out, flags_.vdb, options().memory / 2, scratch_of(flags_), progress);
+    } else {
+        report = write_mrc(leaves, flags_.out, flags_.mrc, progress);
+        result_.statistics = axis == 2 ? all.statistics(leaves.background)
+                                       : statistics_by_slabs(session.stage("statistics"));
     }
-    const BlockOptions blocks = options();
-    write_vdb(leaves, flags_.out, flags_.vdb, blocks.memory / 2, blocks.scratch, progress);
     session.end_stage();
+    result.update(statistics_json(result_.statistics));
+    if (report) report_written(flags_.out, *report, result, session);
 }
 
 }  // namespace vdbgeo::app

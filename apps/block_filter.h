@@ -28,12 +28,14 @@ class BlockFilter {
     /// Takes for the map's values those that `store` writes into the leaves of a part which begin in a box.
     /// `cleared`: clear_inactive.
     using Store = std::function<void(const openvdb::CoordBBox& box, openvdb::FloatTree& part)>;
-    void finish(Store store, bool cleared, const std::string& history, const Progress& progress);
+    void finish(Store store, bool cleared, const std::string& history);
+    /// Writes the map and puts its statistics, and what there is to say of the file, into the result.
+    void write(Json& result, Session& session);
+    /// Of the new values, once they are written.
     const Statistics& statistics() const { return result_.statistics; }
-    /// Writes the map and puts what there is to say of the file into the result.
-    void write(Json& result, Session& session) const;
 
  private:
+    Statistics statistics_by_slabs(const Progress& progress) const;
     openvdb::FloatGrid::Ptr changed(const openvdb::CoordBBox& slab) const;
 
     const MapFilterFlags& flags_;

@@ -212,14 +212,12 @@ void run_denoise_in_blocks(const DenoiseOptions& o, Session& session) {
     if (!solver) filter.fail_empty();
     const Outcome outcome = outcome_of(o, report);
     filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
-                  false, fmt::format("denoised: {}, {}", o.method, outcome.history),
-                  session.stage("statistics"));
+                  false, fmt::format("denoised: {}, {}", o.method, outcome.history));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, filter.in());
     j["method"] = o.method;
     j.update(outcome.numbers);
     j["removed"] = outcome.removed;
-    j.update(statistics_json(filter.statistics()));
     filter.write(j, session);
     seconds["write"] = clock.lap();
     o.checkpoints.remove(session);

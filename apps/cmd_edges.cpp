@@ -75,7 +75,7 @@ void run_edges_in_blocks(const EdgesOptions& o, Session& session) {
     });
     if (!solver) filter.fail_empty();
     filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
-                  true, history_of(options, report), session.stage("statistics"));
+                  true, history_of(options, report));
     seconds["compute"] = clock.lap();
     Json j = result_of(o, filter.in(), report, filter.statistics());
     filter.write(j, session);

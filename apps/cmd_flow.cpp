@@ -114,11 +114,10 @@ void move_density_in_blocks(const FlowOptions& o, Session& session) {
     });
     if (!flow) filter.fail_empty();
     filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { flow->store(box, part); },
-                  false, history_of(options, report), session.stage("statistics"));
+                  false, history_of(options, report));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, filter.in());
     add_flow(options, report, j);
-    j.update(statistics_json(filter.statistics()));
     filter.write(j, session);
     seconds["write"] = clock.lap();
     j["seconds"] = seconds;

@@ -124,6 +124,7 @@ void write_vdb(const LeafSource& map, const std::filesystem::path& path, const V
     }
     const auto grid = std::make_shared<StreamedGrid>(leaves, map.background);
     static_cast<openvdb::MetaMap&>(*grid) = map.meta;
+    if (map.finish_meta) map.finish_meta(*grid);
     // Shared: a copy of a transform rounds its scale.
     grid->setTransform(std::const_pointer_cast<openvdb::math::Transform>(map.transform));
     vdbgeo::write_vdb({grid}, path, options, progress.part(0.6, 1));

@@ -16,6 +16,8 @@ namespace vdbgeo {
 struct LeafSource {
     Frame frame;
     openvdb::MetaMap meta;
+    /// Where it is set: what becomes of the metadata of a VDB file once all leaves were asked for.
+    std::function<void(openvdb::MetaMap&)> finish_meta;
     openvdb::math::Transform::ConstPtr transform;
     float background = 0;
     openvdb::CoordBBox active_box;  ///< is looked at where the frame has no box

@@ -131,6 +131,9 @@ void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress&
     for (std::size_t first = 0; first < sweeps.size(); first += a_part) {
         const Part part{&sweeps, first, std::min(first + a_part, sweeps.size()), &work, plan.halo};
         Totals totals(problem_);
+        // Not where grids are read as well: what is kept would be there beside them.
+        std::optional<BlockField::Reuse> reuse;
+        if (!is_input_ && !reads_input()) reuse.emplace();
         for (std::size_t b = 0; b < plan.blocks.size(); ++b) {
             take_part(part, plan.blocks[b], totals);
             const double done = double(first) + double(part.last - first) * double(b + 1) /
@@ -176,10 +179,10 @@ void BlockedDiffusion::load(const Part& part, const BrickIndex::Part& bricks, co
     if (is_input_) {
         fields.load(map_.read(box)->tree(), offset_);
     } else {
-        if (fields.has_input()) fields.load_input(map_.read(box)->tree(), offset_);
+        if (reads_input()) fields.load_input(map_.read(box)->tree(), offset_);
         for (std::size_t f = 0; f < now_.size(); ++f) now_[f].now->read(bricks.runs, fields.now(f));
     }
-    malloc_trim(0);  // what the grid took goes back before the fields take theirs
+    if (is_input_ || reads_input()) malloc_trim(0);  // what the grid took goes back before the fields grow
     fields.clear_rest();
     if (part.begins()) return;
     const std::vector<float*> d = fields.coefficients();

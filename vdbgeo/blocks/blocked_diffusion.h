@@ -51,6 +51,8 @@ class BlockedDiffusion : public CycleSolver {
     struct Part;
 
     BlockPlan copying_plan(int ghosts) const;
+    /// X is a target.
+    bool reads_input() const { return problem_.fields.size() == 1 && problem_.fields[0].coupling > 0; }
     BlockWork work_of(Stepper stepper, int n) const;
     void find_edges(const Progress& progress);
     void take_part(const Part& part, const openvdb::CoordBBox& own, Totals& totals);

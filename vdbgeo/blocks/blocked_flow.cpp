@@ -3,6 +3,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "vdbgeo/core/parallel.h"
 
@@ -64,7 +65,7 @@ void BlockedFlow::take_block(const CoordBBox& own, float dt, stencil::FieldTotal
         state_.now->read(bricks.runs, state.brick(0));
     else
         stencil::load(layout, map_.read(box)->tree(), 0, state.brick(0));
-    malloc_trim(0);  // what the grids took
+    if (!state_.now || options_.fidelity != 0) malloc_trim(0);  // what the grids took
     clear(rate);
     memory_ = std::max(memory_, layout.memory() + state.memory() + rate.memory());
     layout.work_on(cells_within(own, rate_of_.reach()));
@@ -82,6 +83,8 @@ void BlockedFlow::take_block(const CoordBBox& own, float dt, stencil::FieldTotal
 stencil::FieldSummary BlockedFlow::take(double dt) {
     stencil::FieldTotal total;
     double row_sum = 0;
+    std::optional<BlockField::Reuse> reuse;  // not where grids are read as well
+    if (state_.now && options_.fidelity == 0) reuse.emplace();
     for (const CoordBBox& own : plan_.blocks) take_block(own, static_cast<float>(dt), total, row_sum);
     state_.turn();
     row_sum_ = row_sum;

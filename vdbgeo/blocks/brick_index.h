@@ -58,7 +58,7 @@ class BrickIndex {
 class BrickFile {
  public:
     explicit BrickFile(const std::filesystem::path& folder) : file_(folder) {}
-    /// `field` has the bricks of a part's layout. On all threads.
+    /// `field` has the bricks of a part's layout.
     void read(const std::vector<BrickIndex::Run>& runs, float* field) const;
     void write(const std::vector<BrickIndex::Run>& runs, const float* field);
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <new>
 
 #include "vdbgeo/core/errors.h"
@@ -21,18 +23,74 @@ constexpr std::size_t task = 64;  // bricks
 
 }  // namespace
 
-void BlockField::Free::operator()(float* p) const { std::free(p); }
+namespace {
+
+/// What fields gave back.
+struct Kept {
+    std::mutex mutex;
+    int users = 0;
+    std::multimap<std::size_t, float*> memory;  // by bytes
+
+    void clear() {
+        for (const auto& [bytes, p] : memory) std::free(p);
+        memory.clear();
+    }
+};
+
+Kept& kept() {
+    static Kept all;
+    return all;
+}
+
+/// The smallest piece that is large enough; null where there is none: then all are given back.
+float* take_kept(std::size_t& bytes) {
+    Kept& k = kept();
+    const std::lock_guard<std::mutex> lock(k.mutex);
+    const auto found = k.memory.lower_bound(bytes);
+    if (found == k.memory.end()) {
+        k.clear();
+        return nullptr;
+    }
+    bytes = found->first;
+    float* const p = found->second;
+    k.memory.erase(found);
+    return p;
+}
+
+}  // namespace
+
+BlockField::Reuse::Reuse() {
+    const std::lock_guard<std::mutex> lock(kept().mutex);
+    ++kept().users;
+}
+
+BlockField::Reuse::~Reuse() {
+    const std::lock_guard<std::mutex> lock(kept().mutex);
+    if (--kept().users == 0) kept().clear();
+}
+
+void BlockField::Free::operator()(float* p) const {
+    Kept& k = kept();
+    const std::lock_guard<std::mutex> lock(k.mutex);
+    if (k.users > 0 && bytes >= 4 * huge_page)
+        k.memory.emplace(bytes, p);
+    else
+        std::free(p);
+}
 
 BlockField::BlockField(std::size_t bricks) : bricks_(bricks) {
     const std::size_t wanted = std::max(bricks, std::size_t(1)) * brick_size * sizeof(float);
     const std::size_t alignment = wanted >= 4 * huge_page ? huge_page : cache_line;
-    const std::size_t bytes = (wanted + alignment - 1) / alignment * alignment;
-    void* p = std::aligned_alloc(alignment, bytes);
-    if (!p) throw std::bad_alloc();
+    std::size_t bytes = (wanted + alignment - 1) / alignment * alignment;
+    float* p = alignment == huge_page ? take_kept(bytes) : nullptr;
+    if (!p) {
+        p = static_cast<float*>(std::aligned_alloc(alignment, bytes));
+        if (!p) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-    if (alignment == huge_page) madvise(p, bytes, MADV_HUGEPAGE);  // fewer misses of the TLB; advice only
+        if (alignment == huge_page) madvise(p, bytes, MADV_HUGEPAGE);  // fewer misses of the TLB; advice only
 #endif
-    data_.reset(static_cast<float*>(p));
+    }
+    data_ = std::unique_ptr<float[], Free>(p, Free(bytes));
 }
 
 double FieldSummary::variance() const {

@@ -56,7 +56,8 @@ BlockFilter::BlockFilter(const MapFilterFlags& flags, Session& session)
     : flags_(flags), map_(flags.in, reading(flags), session.stage("opening")) {
     session.end_stage();
     if (!map_.frame().bounded())
-        throw InvalidInput(flags.in + ": the grid has no box, which blocks of it need; vdbgeo convert makes one");
+        throw InvalidInput(flags.in +
+                           ": the grid has no box, which blocks of it need; vdbgeo convert makes one");
     for (const std::string& w : in().warnings) session.warn(flags.in + ": " + w);
     if (!session.json && !session.quiet)
         for (const std::string& note : in().notes) session.say(flags.in + ": " + note);
@@ -140,8 +141,8 @@ void BlockFilter::write(Json& result, Session& session) {
         write_vdb(leaves, flags_.out, flags_.vdb, options().memory / 2, scratch_of(flags_), progress);
     } else {
         report = write_mrc(leaves, flags_.out, flags_.mrc, progress);
-        result_.statistics = axis == 2 ? all.statistics(leaves.background)
-                                       : statistics_by_slabs(session.stage("statistics"));
+        result_.statistics =
+            axis == 2 ? all.statistics(leaves.background) : statistics_by_slabs(session.stage("statistics"));
     }
     session.end_stage();
     result.update(statistics_json(result_.statistics));

@@ -10,8 +10,8 @@
 
 namespace vdbgeo::app {
 
-/// Whether the map is to be filtered block by block: a folder of parts, or a map file of which all samples, as
-/// its header tells them, would take more than --memory. Samples that a threshold keeps count as all where
+/// Whether the map is to be filtered block by block: a folder of parts, or a map file of which all samples,
+/// as its header tells them, would take more than --memory. Samples that a threshold keeps count as all where
 /// --memory is given; else they are counted once they are read.
 bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need);
 

@@ -235,8 +235,7 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     const bool blocks_will_do =
         o.diffuses() && o.diffusion.options.stepper != Stepper::adi && !draws(o) && !session.team;
     if (blocks_will_do && in_blocks(o.files, need)) return run_denoise_in_blocks(o, session);
-    FilterInput input =
-        read_filter_input(o.files, need, hyperdiffusion_halo(o.diffusion.options), session);
+    FilterInput input = read_filter_input(o.files, need, hyperdiffusion_halo(o.diffusion.options), session);
     MapFile& in = input.in;
     need_density(o.files.in, in);
     seconds["read"] = clock.lap();
@@ -248,8 +247,8 @@ void run_denoise(const DenoiseOptions& o, Session& session) {
     const double rms_before = active_moments(*in.map.grid, input.counted()).statistics().rms;
     seconds["preview"] = clock.lap();
     openvdb::FloatGrid& grid = *in.map.grid;
-    const Outcome outcome = o.diffuses() ? diffuse(o, grid, input.share(), session)
-                                         : filter(o, grid, session.stage("denoising"));
+    const Outcome outcome =
+        o.diffuses() ? diffuse(o, grid, input.share(), session) : filter(o, grid, session.stage("denoising"));
     finish_map(input, fmt::format("denoised: {}, {}", o.method, outcome.history));
     seconds["compute"] = clock.lap();
     Json j = filter_result(o.files, in);

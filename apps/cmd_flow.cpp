@@ -59,12 +59,13 @@ void start_preview(const FlowOptions& o, const DensityMap& map, Run& run, Sessio
 }
 
 std::string settings_of(const GeometricFlowOptions& options) {
-    return fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order, options.fidelity,
-                       options.pressure, options.scale);
+    return fmt::format("order {}, fidelity {}, pressure {}, density scale {}", options.order,
+                       options.fidelity, options.pressure, options.scale);
 }
 
 std::string history_of(const GeometricFlowOptions& options, const HyperdiffusionReport& r) {
-    return fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings_of(options), r.time, r.steps);
+    return fmt::format("flow of the density: {}, time {:.9g}, {} steps", settings_of(options), r.time,
+                       r.steps);
 }
 
 /// What was chosen and done.
@@ -92,8 +93,8 @@ void move_density(const FlowOptions& o, FilterInput& input, Run& run, Session& s
     start_preview(o, in.map, run, session);
     const GeometricFlowOptions& options = o.flow.density;
     const Progress progress = session.stage("flow");
-    const HyperdiffusionReport r = naming(
-        o.files.in, [&] { return geometric_flow(*in.map.grid, options, progress, input.share()); });
+    const HyperdiffusionReport r =
+        naming(o.files.in, [&] { return geometric_flow(*in.map.grid, options, progress, input.share()); });
     finish_map(input, history_of(options, r));
     add_flow(options, r, run.result);
     write_moved(o, input, in.map, r.bytes_sent, run, session);
@@ -110,7 +111,8 @@ void move_density_in_blocks(const FlowOptions& o, Session& session) {
     seconds["read"] = clock.lap();
     HyperdiffusionReport report;
     const auto flow = naming(o.files.in, [&] {
-        return geometric_flow_blocks(filter.source(), options, filter.options(), report, session.stage("flow"));
+        return geometric_flow_blocks(filter.source(), options, filter.options(), report,
+                                     session.stage("flow"));
     });
     if (!flow) filter.fail_empty();
     filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { flow->store(box, part); },

@@ -191,8 +191,8 @@ void check_for_team(const SurfaceOptions& o, const Isovalue& rule) {
         throw UsageError("--iso: a team takes a density, a number of sigmas, record:FILE or auto");
 }
 
-/// Every member puts what it has where it belongs in one file, which the first makes, and which has its name when
-/// all of it is there.
+/// Every member puts what it has where it belongs in one file, which the first makes, and which has its name
+/// when all of it is there.
 void write_by_team(const TeamSurface& surface, const std::string& out, Team& team, const Progress& progress) {
     const std::string unfinished = out + ".unfinished";
     const bool first = team.rank() == 0;

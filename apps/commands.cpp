@@ -74,7 +74,9 @@ std::vector<Command> all_commands() {
             model_command(),          report_command(),     merge_command()};
 }
 
-std::vector<Command> team_commands() { return {denoise_command(), edges_command(), flow_command(), surface_command()}; }
+std::vector<Command> team_commands() {
+    return {denoise_command(), edges_command(), flow_command(), surface_command()};
+}
 
 int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single,
         const TeamRun& team) {

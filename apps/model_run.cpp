@@ -14,9 +14,9 @@
 #include "apps/model_stages.h"
 #include "apps/reports.h"
 #include "apps/subcommand.h"
-#include "vdbgeo/core/file_hash.h"
 #include "vdbgeo/core/atomic_file.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/file_hash.h"
 #include "vdbgeo/view/render.h"
 
 namespace vdbgeo::app {

@@ -14,10 +14,10 @@ namespace vdbgeo::app {
 
 struct ReportOptions {
     std::string folder;
-    std::string out;                     ///< empty: report.html in the folder
-    std::string title;                   ///< empty: from the map's name, else the folder's
-    std::uint64_t faces = 200'000;       ///< of the surface on the page
-    std::uint64_t tets = 200'000;        ///< on the page
+    std::string out;                       ///< empty: report.html in the folder
+    std::string title;                     ///< empty: from the map's name, else the folder's
+    std::uint64_t faces = 200'000;         ///< of the surface on the page
+    std::uint64_t tets = 200'000;          ///< on the page
     std::uint64_t max_bytes = 10'000'000;  ///< of the page
     /// Called by the run itself, as its last stage: that it has not ended yet is no news.
     bool within_run = false;

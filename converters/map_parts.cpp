@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "converters/mrc_sink.h"
-#include "converters/streamed_grid.h"
 #include "converters/vdb_sections.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -182,72 +180,35 @@ void MapParts::copy_to(const CoordBBox& box, openvdb::FloatTree& to, const Progr
     }
 }
 
-MrcWriteReport MapParts::write_mrc(const fs::path& path, const MrcWriteOptions& options,
-                                   const Progress& progress) const {
+/// The whole as it is written.
+LeafSource MapParts::leaves() const {
     const State* const s = state_.get();
-    const auto lookup = [s]() -> LeafLookup {
-        return [leaves = s->leaf_reader()](const Coord& corner, float& tile) -> const float* {
-            const leaf::Leaf* found = leaves(corner, tile);
-            return found ? found->buffer().data() : nullptr;
+    LeafSource map;
+    map.frame = frame();
+    map.meta = s->meta;
+    map.transform = s->parts[0].grid().constTransformPtr();
+    map.background = s->background();
+    map.active_box = s->active_box;
+    map.finder = [s]() -> LeafSource::Finder {
+        return [s, leaves = s->leaf_reader()](const Coord& corner) {
+            LeafSource::Found found;
+            found.leaf = leaves(corner, found.tile);
+            const std::size_t part = found.leaf ? s->parts.size() : s->part_at(corner);
+            found.on = part < s->parts.size() && s->parts[part].grid().tree().isValueOn(corner);
+            return found;
         };
     };
-    return write_mrc_from(
-        s->meta, frame(), s->active_box, path, options,
-        [&](const MrcBox& box, const std::array<int, 3>& order) {
-            return DenseSections(lookup, box.first, box.frame.size, order);
-        },
-        progress);
+    return map;
+}
+
+MrcWriteReport MapParts::write_mrc(const fs::path& path, const MrcWriteOptions& options,
+                                   const Progress& progress) const {
+    return vdbgeo::write_mrc(leaves(), path, options, progress);
 }
 
 void MapParts::write_vdb(const fs::path& path, const VdbWriteOptions& options, std::uint64_t memory,
                          const fs::path& scratch, const Progress& progress) const {
-    const State& s = *state_;
-    SparsifyOptions any_value;  // inactive values may be any: as with a band
-    any_value.threshold = 0.0f;
-    any_value.band = 1.0f;
-    const StripSorter sorter(frame().size, {0, 1, 2}, any_value);
-    const auto leaves = std::make_shared<PackedLeaves>(sorter, options, memory, scratch);
-    const Vec3i size = frame().size;
-    const float background = s.background();
-    const auto strip_at = [&](int slab, int row) {
-        const VdbSections::Leaves reader = s.leaf_reader();
-        SortedStrip strip;
-        for (int x = 0; x < size.x(); x += leaf::dim) {
-            const Coord corner(x, row * leaf::dim, slab * leaf::dim);
-            float tile = background;
-            SortedBlock block;
-            block.origin = corner;
-            if (const leaf::Leaf* found = reader(corner, tile)) {
-                block.leaf = std::make_unique<leaf::Leaf>(*found);
-                float* values = block.leaf->buffer().data();
-                for (auto it = block.leaf->beginValueOff(); it; ++it)
-                    if (values[it.pos()] == background) values[it.pos()] = StripSorter::unknown_background;
-            } else {
-                const bool on = s.part_at(corner) < s.parts.size() &&
-                                s.parts[s.part_at(corner)].grid().tree().isValueOn(corner);
-                if (!on && tile == background) continue;
-                block.tile = on ? SortedBlock::Tile::kept : SortedBlock::Tile::above;
-                block.tile_value = tile;
-            }
-            strip.blocks.push_back(std::move(block));
-        }
-        return strip;
-    };
-    for (int slab = 0; slab < sorter.slabs(); ++slab) {
-        std::vector<std::shared_ptr<const PackedLeaves::Row>> rows(
-            static_cast<std::size_t>(sorter.strips_in_slab()));
-        parallel_for(rows.size(), 1, [&](std::size_t row) {
-            rows[row] = leaves->pack(strip_at(slab, static_cast<int>(row)));
-        });
-        leaves->add_slab(rows);
-        progress.part(0, 0.6).report(double(slab + 1) / sorter.slabs());
-    }
-    const auto grid = std::make_shared<StreamedGrid>(leaves, background);
-    static_cast<openvdb::MetaMap&>(*grid) = s.meta;
-    // Shared: a copy of a transform rounds its scale.
-    grid->setTransform(
-        std::const_pointer_cast<openvdb::math::Transform>(s.parts[0].grid().constTransformPtr()));
-    vdbgeo::write_vdb({grid}, path, options, progress.part(0.6, 1));
+    vdbgeo::write_vdb(leaves(), path, options, memory, scratch, progress);
 }
 
 }  // namespace vdbgeo

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "converters/leaf_source.h"
 #include "converters/mrc.h"
 #include "converters/vdb_file.h"
 #include "vdbgeo/core/progress.h"
@@ -55,6 +56,7 @@ class MapParts {
 
  private:
     struct State;
+    LeafSource leaves() const;
     std::unique_ptr<State> state_;
 };
 

@@ -1,5 +1,7 @@
 // Diffusion in blocks, with the values in files between cycles, gives each voxel the bits that it gets in one
 // grid in memory.
+#include "vdbgeo/blocks/blocked_diffusion.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -7,7 +9,6 @@
 
 #include "tests/blocks/noisy_map.h"
 #include "tests/support/temp_folder.h"
-#include "vdbgeo/blocks/blocked_diffusion.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/volume/grid_part.h"
 
@@ -133,7 +134,8 @@ TEST(BlockedHyperdiffusionErrors, AreThoseOfOneGrid) {
     EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, {1000, folder.path(), {}, {}, {}}, report),
                  NumericalError);
     EXPECT_THROW(
-        hyperdiffuse_blocks(source_of(*input), o, {0, "/not/there", Coord(64, 64, 128), {}, {}}, report), IoError);
+        hyperdiffuse_blocks(source_of(*input), o, {0, "/not/there", Coord(64, 64, 128), {}, {}}, report),
+        IoError);
     input->tree().setValueOn(Coord(30, 70, 70), std::nanf(""));
     EXPECT_THROW(hyperdiffuse_blocks(source_of(*input), o, blocks, report), InvalidInput);
     const FloatGrid::Ptr empty = test::empty_grid();

@@ -1,4 +1,6 @@
 // A geometric flow in blocks, and one by a team, give each voxel the bits that it gets in one grid.
+#include "vdbgeo/blocks/blocked_flow.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -7,7 +9,6 @@
 #include "tests/blocks/noisy_map.h"
 #include "tests/support/temp_folder.h"
 #include "tests/support/thread_team.h"
-#include "vdbgeo/blocks/blocked_flow.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/volume/grid_part.h"

@@ -1,5 +1,7 @@
-// A diffusion that was stopped goes on from its checkpoint, whoever has the parts, and ends with the bits of one
-// that was not.
+// A diffusion that was stopped goes on from its checkpoint, whoever has the parts, and ends with the bits of
+// one that was not.
+#include "vdbgeo/flow/checkpoint.h"
+
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -12,7 +14,6 @@
 #include "vdbgeo/blocks/blocked_diffusion.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
-#include "vdbgeo/flow/checkpoint.h"
 #include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {

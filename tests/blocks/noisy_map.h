@@ -41,9 +41,9 @@ inline std::vector<DiffusionSetting> diffusion_settings() {
         return o;
     };
     std::vector<DiffusionSetting> all{{"q0 local", with(0, "local")},      {"q0 global", with(0, "global")},
-                             {"q1 local:3", with(1, "local:3")},  {"q1 global", with(1, "global")},
-                             {"q2 local:8", with(2, "local:8")},  {"q2 inf", with(2, "inf")},
-                             {"q1 until done", with(1, "global")}};
+                                      {"q1 local:3", with(1, "local:3")},  {"q1 global", with(1, "global")},
+                                      {"q2 local:8", with(2, "local:8")},  {"q2 inf", with(2, "inf")},
+                                      {"q1 until done", with(1, "global")}};
     all.back().options.steps.reset();
     all.push_back({"q0+q1 euler, fidelity", with(1, "local")});
     all.back().options.terms = {{0, 0.5}, {1, 1.0}};

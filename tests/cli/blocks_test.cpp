@@ -30,8 +30,8 @@ class Blocks : public Cli {
         ASSERT_TRUE(blocks.is_object()) << r.out;
         EXPECT_EQ(whole["blocks"], 0);
         EXPECT_GT(blocks["blocks"].get<int>(), 1);
-        for (const char* key : {"time", "steps", "noise", "removed", "mean_before", "mean_after", "min", "max",
-                                "mean", "rms", "active_voxels"})
+        for (const char* key : {"time", "steps", "noise", "removed", "mean_before", "mean_after", "min",
+                                "max", "mean", "rms", "active_voxels"})
             EXPECT_EQ(blocks.value(key, Json()), whole.value(key, Json())) << key;
         EXPECT_TRUE(bytes("one" + ending) == bytes("many" + ending));
         if (!sanitized) EXPECT_LT(r.peak_bytes, std::uint64_t(200) << 20);
@@ -43,19 +43,18 @@ class Blocks : public Cli {
 TEST_F(Blocks, DenoiseToTheSameBytes) {
     const std::string map = noisy();
     expect_same({"denoise", map, "--order", "1", "--steps", "12"}, ".mrc");
-    expect_same({"denoise", map, "--order", "0", "--sigma", "local", "--steps", "24", "--cycle", "24"}, ".vdb");
+    expect_same({"denoise", map, "--order", "0", "--sigma", "local", "--steps", "24", "--cycle", "24"},
+                ".vdb");
     EXPECT_EQ(listing(), (std::set<std::string>{"a.mrc", "one.mrc", "many.mrc", "one.vdb", "many.vdb"}));
 }
 
-TEST_F(Blocks, TheTimeIsFoundAllTheSame) {
-    expect_same({"denoise", noisy(), "--order", "1"}, ".mrc");
-}
+TEST_F(Blocks, TheTimeIsFoundAllTheSame) { expect_same({"denoise", noisy(), "--order", "1"}, ".mrc"); }
 
 TEST_F(Blocks, SomeSamplesOnly) {
     const std::string map = noisy();
     expect_same({"denoise", map, "--order", "1", "--steps", "6", "--threshold", "0.5sigma"}, ".vdb");
-    expect_same({"denoise", map, "--order", "0", "--steps", "6", "--threshold", "0.2", "--mode", "1", "--scale",
-                 "auto"},
+    expect_same({"denoise", map, "--order", "0", "--steps", "6", "--threshold", "0.2", "--mode", "1",
+                 "--scale", "auto"},
                 ".mrc");
 }
 
@@ -76,8 +75,10 @@ TEST_F(Blocks, WhatNeedsTheWholeMapSaysSo) {
         expect_error(vdbgeo(words), 5, map + ": ", "--memory");
     }
     // Less than what the program takes anyway.
-    expect_error(vdbgeo({"denoise", map, at("b.mrc"), "--memory", "64M", "--quiet"}), 5, map + ": ", "memory");
-    expect_error(vdbgeo({"denoise", map, at("b.mrc"), "--memory", memory, "--scratch", at("none"), "--quiet"}),
-                 4, at("none"));
+    expect_error(vdbgeo({"denoise", map, at("b.mrc"), "--memory", "64M", "--quiet"}), 5, map + ": ",
+                 "memory");
+    expect_error(
+        vdbgeo({"denoise", map, at("b.mrc"), "--memory", memory, "--scratch", at("none"), "--quiet"}), 4,
+        at("none"));
     EXPECT_EQ(listing(), std::set<std::string>{"a.mrc"});
 }

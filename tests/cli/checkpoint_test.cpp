@@ -42,7 +42,8 @@ TEST_F(Checkpoints, KilledAtAnyMomentItGoesOn) {
         fs::remove(at("b.mrc"));
         RunOptions options;
         // Moments that repeat, all over the run.
-        options.signal_after = std::chrono::milliseconds(static_cast<int>(1000 * all * ((i * 7 + 3) % 20) / 20));
+        options.signal_after =
+            std::chrono::milliseconds(static_cast<int>(1000 * all * ((i * 7 + 3) % 20) / 20));
         const Ended r = vdbgeo(words("b.mrc", {"--checkpoint", at("c"), "--resume"}), options);
         killed += r.killed == SIGKILL;
         if (r.killed) EXPECT_FALSE(fs::exists(at("b.mrc")));

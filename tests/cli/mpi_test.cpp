@@ -49,7 +49,8 @@ TEST_F(Mpi, FindsTheSameEdges) {
 }
 
 TEST_F(Mpi, FlowsTheSame) {
-    expect_same({"flow", noisy(), "--time", "0.3", "--density-scale", "3", "--threshold", "0.1"}, ".mrc", {2, 5});
+    expect_same({"flow", noisy(), "--time", "0.3", "--density-scale", "3", "--threshold", "0.1"}, ".mrc",
+                {2, 5});
 }
 
 TEST_F(Mpi, TheTimeIsFoundTogether) {

@@ -1,10 +1,9 @@
 // Bytes held in memory, on the disk, or across both.
-#include "converters/byte_store.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "converters/byte_store.h"
 #include "converters/strip_source.h"
 #include "tests/support/maps.h"
 #include "tests/support/mrc_bytes.h"

@@ -110,8 +110,8 @@ class Planner {
         std::vector<Candidate> out;
         std::array<std::vector<int>, 3> sizes;
         for (int a = 0; a < 3; ++a)
-            sizes[static_cast<std::size_t>(a)] = sizes_along((cells_.max()[a] + 1 - cells_.min()[a]) /
-                                                             cell_size[static_cast<std::size_t>(a)]);
+            sizes[static_cast<std::size_t>(a)] =
+                sizes_along((cells_.max()[a] + 1 - cells_.min()[a]) / cell_size[static_cast<std::size_t>(a)]);
         for (const int steps : step_counts())
             for (const int x : sizes[0])
                 for (const int y : sizes[1])
@@ -139,9 +139,7 @@ class Planner {
         }
         return most;
     }
-    int halo_of(int steps) const {
-        return block_halo(work_, steps, true, true);
-    }
+    int halo_of(int steps) const { return block_halo(work_, steps, true, true); }
 
  private:
     std::vector<int> step_counts() const {
@@ -185,8 +183,7 @@ class Planner {
 }  // namespace
 
 int block_halo(const BlockWork& work, int steps, bool first, bool last) {
-    const int halo =
-        steps * work.reach + (first ? work.first_reach : 0) + (last ? work.last_reach : 0);
+    const int halo = steps * work.reach + (first ? work.first_reach : 0) + (last ? work.last_reach : 0);
     return (halo + 7) / 8 * 8;
 }
 
@@ -216,10 +213,11 @@ BlockPlan plan_blocks(const CoordBBox& box, const BlockWork& work, std::uint64_t
         if (memory > double(bytes)) continue;
         return {c.size, c.steps, planner.halo_of(c.steps), blocks_of(box, c.size, index)};
     }
-    throw NumericalError(fmt::format(
-        "the smallest blocks take {:.0f} MB, and {:.0f} MB are left for them; try --bin 2, --crop, --threshold "
-        "or a larger --memory",
-        least / 1e6, double(bytes) / 1e6));
+    throw NumericalError(
+        fmt::format("the smallest blocks take {:.0f} MB, and {:.0f} MB are left for them; try --bin 2, "
+                    "--crop, --threshold "
+                    "or a larger --memory",
+                    least / 1e6, double(bytes) / 1e6));
 }
 
 }  // namespace vdbgeo

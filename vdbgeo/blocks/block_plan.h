@@ -12,11 +12,11 @@ namespace vdbgeo {
 
 /// What blocks are made for.
 struct BlockWork {
-    int steps = 0;           ///< of a cycle; 0: the map is only read
+    int steps = 0;  ///< of a cycle; 0: the map is only read
     int steps_a_sweep = 1;
-    int reach = 1;           ///< voxels that a step looks around
-    int first_reach = 0;     ///< and the coefficients before the first one
-    int last_reach = 0;      ///< and what is found after the last one
+    int reach = 1;        ///< voxels that a step looks around
+    int first_reach = 0;  ///< and the coefficients before the first one
+    int last_reach = 0;   ///< and what is found after the last one
     double bytes_a_brick = 0;
     double bytes_of_window = 0;  ///< for each brick of two slabs of 32 voxels along y, on top
 };

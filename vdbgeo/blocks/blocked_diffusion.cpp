@@ -136,8 +136,8 @@ void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress&
         if (!is_input_ && !reads_input()) reuse.emplace();
         for (std::size_t b = 0; b < plan.blocks.size(); ++b) {
             take_part(part, plan.blocks[b], totals);
-            const double done = double(first) + double(part.last - first) * double(b + 1) /
-                                                    double(plan.blocks.size());
+            const double done =
+                double(first) + double(part.last - first) * double(b + 1) / double(plan.blocks.size());
             progress.report(done / double(sweeps.size()));
         }
         for (BrickGenerations& g : now_) g.turn();
@@ -200,7 +200,7 @@ void BlockedDiffusion::put_down(const Part& part, const BrickIndex::Part& bricks
     if (part.ends()) return;
     if (!(*part.sweeps)[part.last - 1].ends) {
         step_before_.resize(problem_.fields.size());
-        for (std::size_t f = 0; f < step_before_.size(); ++f) 
+        for (std::size_t f = 0; f < step_before_.size(); ++f)
             next_of(step_before_[f], scratch).write(runs, fields.before(f));
     }
     if (!part.begins()) return;
@@ -330,16 +330,15 @@ std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
                                                       const Progress& progress) {
     options.check();
     auto solver = std::make_unique<BlockedDiffusion>(
-        source, std::vector<DiffusionProblem::Field>{{options.terms, options.fidelity}}, options.sigma, blocks,
-        progress.part(0, 0.1));
+        source, std::vector<DiffusionProblem::Field>{{options.terms, options.fidelity}}, options.sigma,
+        blocks, progress.part(0, 0.1));
     if (solver->active_voxels() == 0) return nullptr;
     report.automatic = !options.time && !options.steps;
     if (report.automatic) report.noise = noise_of(source, solver->active_voxels());
     const double step = solver->step(options.stepper, options.dt);
-    report.resumed_cycles =
-        with_checkpoints(*solver, blocks.checkpoint, options.text(), nullptr, [&](CycleSolver& s) {
-            take_cycles(s, options, step, report.noise, report, progress.part(0.1, 1));
-        });
+    report.resumed_cycles = with_checkpoints(
+        *solver, blocks.checkpoint, options.text(), nullptr,
+        [&](CycleSolver& s) { take_cycles(s, options, step, report.noise, report, progress.part(0.1, 1)); });
     solver->describe(report);
     return solver;
 }
@@ -354,10 +353,9 @@ std::unique_ptr<BlockedDiffusion> coupled_high_pass_blocks(const MapSource& sour
                                                      progress.part(0, 0.1));
     if (solver->active_voxels() == 0) return nullptr;
     const double step = solver->step(options.stepper, options.dt);
-    report.resumed_cycles =
-        with_checkpoints(*solver, blocks.checkpoint, options.text(), nullptr, [&](CycleSolver& s) {
-            take_high_pass_cycles(s, options, step, report, progress.part(0.1, 1));
-        });
+    report.resumed_cycles = with_checkpoints(
+        *solver, blocks.checkpoint, options.text(), nullptr,
+        [&](CycleSolver& s) { take_high_pass_cycles(s, options, step, report, progress.part(0.1, 1)); });
     solver->describe(report);
     return solver;
 }

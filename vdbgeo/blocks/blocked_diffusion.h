@@ -75,8 +75,8 @@ class BlockedDiffusion : public CycleSolver {
     std::size_t most_blocks_ = 0, most_memory_ = 0;
 };
 
-/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. Null where no voxel
-/// is active.
+/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. Null where no
+/// voxel is active.
 std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
                                                       const HyperdiffusionOptions& options,
                                                       const BlockOptions& blocks,

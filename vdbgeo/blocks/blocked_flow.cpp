@@ -102,7 +102,8 @@ void BlockedFlow::store(const CoordBBox& box, openvdb::FloatTree& part) const {
     stencil::store(layout, s.brick(0), 0, part);
 }
 
-std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source, const GeometricFlowOptions& options,
+std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source,
+                                                   const GeometricFlowOptions& options,
                                                    const BlockOptions& blocks, HyperdiffusionReport& report,
                                                    const Progress& progress) {
     options.check();

@@ -9,9 +9,9 @@
 
 namespace vdbgeo {
 
-/// geometric_flow's values, to the bit, whatever the blocks. The bound of a step is that of the whole map, so one
-/// step is taken at a time: a pass over the map, in which each block takes it with ghosts of 2 (q+1) voxels and
-/// finds the bound of the next. Between steps S is in temporary files.
+/// geometric_flow's values, to the bit, whatever the blocks. The bound of a step is that of the whole map, so
+/// one step is taken at a time: a pass over the map, in which each block takes it with ghosts of 2 (q+1)
+/// voxels and finds the bound of the next. Between steps S is in temporary files.
 class BlockedFlow : public FlowSteps {
  public:
     /// Goes through the map twice. Errors as geometric_flow; NumericalError where the memory is too small.
@@ -43,7 +43,8 @@ class BlockedFlow : public FlowSteps {
 };
 
 /// geometric_flow of such a map; what it made is then in the result. Null where no voxel is active.
-std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source, const GeometricFlowOptions& options,
+std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source,
+                                                   const GeometricFlowOptions& options,
                                                    const BlockOptions& blocks, HyperdiffusionReport& report,
                                                    const Progress& progress = {});
 

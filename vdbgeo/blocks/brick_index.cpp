@@ -128,7 +128,8 @@ void BrickFile::read(const std::vector<BrickIndex::Run>& runs, float* field) con
 void BrickFile::write(const std::vector<BrickIndex::Run>& runs, const float* field) {
     // By one thread: a file system lets but one write to a file, and others would wait in turn.
     for (const BrickIndex::Run& run : runs)
-        file_.write(run.first * brick_bytes, field + run.at * BlockField::brick_size, run.count * brick_bytes);
+        file_.write(run.first * brick_bytes, field + run.at * BlockField::brick_size,
+                    run.count * brick_bytes);
 }
 
 }  // namespace vdbgeo

@@ -13,8 +13,8 @@
 namespace vdbgeo {
 
 /// The active leaves of a map by cells of 32 × 32 × 128 voxels (stencil::BlockLayout), numbered in the order
-/// in which a layout of the whole map would have its bricks. Memory: 64 bytes a cell, of up to 256 leaves, and
-/// 64 for each leaf that is not full.
+/// in which a layout of the whole map would have its bricks. Memory: 64 bytes a cell, of up to 256 leaves,
+/// and 64 for each leaf that is not full.
 class BrickIndex {
  public:
     struct Cell {

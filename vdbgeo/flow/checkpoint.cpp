@@ -80,8 +80,8 @@ struct CheckpointedSolver::List {
 CheckpointedSolver::CheckpointedSolver(CycleSolver& solver, const CheckpointOptions& options,
                                        const std::string& what, Team* team)
     : solver_(solver), options_(options), team_(team) {
-    key_ = text_hash(fmt::format("{}\nmap {:016x}, {} voxels", what, solver.input_hash(),
-                                 solver.active_voxels()));
+    key_ = text_hash(
+        fmt::format("{}\nmap {:016x}, {} voxels", what, solver.input_hash(), solver.active_voxels()));
     if (options_.resume) resume();
 }
 

@@ -30,10 +30,10 @@ void HighPassOptions::check() const {
 }
 
 std::string HighPassOptions::text() const {
-    std::string out =
-        fmt::format("high pass order {} {:a} {:a} coupling {:a} {:a} sigma {} {:a} {:a} {} time {:a} stepper {}",
-                    order, slow, fast, coupling_u, coupling_v, static_cast<int>(sigma.kind), sigma.value,
-                    sigma.factor, sigma.radius, time, static_cast<int>(stepper));
+    std::string out = fmt::format(
+        "high pass order {} {:a} {:a} coupling {:a} {:a} sigma {} {:a} {:a} {} time {:a} stepper {}", order,
+        slow, fast, coupling_u, coupling_v, static_cast<int>(sigma.kind), sigma.value, sigma.factor,
+        sigma.radius, time, static_cast<int>(stepper));
     if (dt) out += fmt::format(" dt {:a}", *dt);
     if (cycle) out += fmt::format(" cycle {}", *cycle);
     return out;

@@ -71,7 +71,7 @@ void take(CycleSolver& solver, Stepper stepper, const CycleRun& cycles, Hyperdif
     for (int done = 0; done < cycles.cycles;) {
         const int together = std::min(most, cycles.cycles - done);
         solver.cycle(stepper, cycles.n * together, cycles.tau,
-              progress.part(double(done) / cycles.cycles, double(done + together) / cycles.cycles));
+                     progress.part(double(done) / cycles.cycles, double(done + together) / cycles.cycles));
         done += together;
     }
     report.steps += cycles.cycles * cycles.n;
@@ -184,7 +184,7 @@ class UntilNoiseIsGone {
 }  // namespace
 
 void CycleSolver::run(Stepper stepper, const std::vector<CycleRun>& cycles, HyperdiffusionReport& report,
-                          const Progress& progress) {
+                      const Progress& progress) {
     double all = 0, done = 0;
     for (const CycleRun& r : cycles) all += double(r.cycles) * r.n;
     for (const CycleRun& r : cycles) {

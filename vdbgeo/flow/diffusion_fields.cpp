@@ -17,7 +17,8 @@ namespace vdbgeo {
 using stencil::BlockField;
 using stencil::BlockLayout;
 
-DiffusionProblem::DiffusionProblem(std::vector<Field> given, const EdgeScale& scale, const Vec3d& axis_weights)
+DiffusionProblem::DiffusionProblem(std::vector<Field> given, const EdgeScale& scale,
+                                   const Vec3d& axis_weights)
     : fields(std::move(given)), sigma(scale), weights(axis_weights) {
     for (Field& f : fields) {
         f.terms.erase(std::remove_if(f.terms.begin(), f.terms.end(),
@@ -66,8 +67,7 @@ std::vector<CycleSweep> sweeps_of_cycle(Stepper stepper, int n, double tau, int 
     for (int s = 0, k = 0; s < count; ++s) {
         CycleSweep& sweep = sweeps[static_cast<std::size_t>(s)];
         const int end = static_cast<int>(static_cast<std::int64_t>(n) * (s + 1) / count);
-        for (; k < end; ++k)
-            sweep.steps.push_back({stepper == Stepper::fsi ? fsi_relaxation(k) : 1.0, tau});
+        for (; k < end; ++k) sweep.steps.push_back({stepper == Stepper::fsi ? fsi_relaxation(k) : 1.0, tau});
         sweep.begins = s == 0 || stepper != Stepper::fsi;
         sweep.ends = s + 1 == count || stepper != Stepper::fsi;
     }
@@ -91,8 +91,9 @@ DiffusionFields::DiffusionFields(const DiffusionProblem& problem, BlockLayout la
 void DiffusionFields::clear_rest() {
     const auto fill = [](float* begin, const float* end, float value) {
         const auto count = static_cast<std::size_t>(end - begin);
-        parallel_blocks(count, 1 << 17,
-                        [&](std::size_t from, std::size_t to) { std::fill(begin + from, begin + to, value); });
+        parallel_blocks(count, 1 << 17, [&](std::size_t from, std::size_t to) {
+            std::fill(begin + from, begin + to, value);
+        });
     };
     for (State& s : states_) {
         BlockField &now = s.now.all(), &before = s.before.all();
@@ -183,9 +184,9 @@ stencil::SweepPlan DiffusionFields::plan(const CycleSweep& sweep) {
     return p;
 }
 
-/// First order in time for any θ. With constant coefficients (Σλ_a)^{q+1} ≤ 3^q Σ λ_a^{q+1}, so an amplitude changes by
-/// at most 3^q/θ times itself: in a box stable for θ ≥ 3^q/2, whatever τ. On other masks the A_a do not
-/// commute: a hundred times the explicit bound diverges there, and so it does with a larger θ.
+/// First order in time for any θ. With constant coefficients (Σλ_a)^{q+1} ≤ 3^q Σ λ_a^{q+1}, so an amplitude
+/// changes by at most 3^q/θ times itself: in a box stable for θ ≥ 3^q/2, whatever τ. On other masks the A_a
+/// do not commute: a hundred times the explicit bound diverges there, and so it does with a larger θ.
 void DiffusionFields::implicit_step(double tau) {
     stencil::SweepPlan p = plan({{{1.0, tau}}, true, false});  // u_k stays, in `before`
     sweep(layout_, p);

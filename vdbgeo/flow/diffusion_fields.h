@@ -12,8 +12,8 @@
 
 namespace vdbgeo {
 
-/// u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u) for one field or two. With one field the target is X; with
-/// two, each is drawn to the other.
+/// u = X, u_t = −Σ_q L_{d_q} L^q u + β (target − u) for one field or two. With one field the target is X;
+/// with two, each is drawn to the other.
 struct DiffusionProblem {
     struct Field {
         std::vector<DiffusionTerm> terms;  ///< by order, ascending
@@ -59,9 +59,9 @@ class DiffusionFields {
 
     stencil::BlockLayout& layout() { return layout_; }
     const stencil::BlockLayout& layout() const { return layout_; }
-    /// Makes all values but those of `now` finite, and nothing flow: for blocks, where cells that nobody needs
-    /// are not computed, and what is read of them must not become an infinity. (`inactive` would: kernels trust
-    /// full leaves.)
+    /// Makes all values but those of `now` finite, and nothing flow: for blocks, where cells that nobody
+    /// needs are not computed, and what is read of them must not become an infinity. (`inactive` would:
+    /// kernels trust full leaves.)
     void clear_rest();
     /// All fields, and the target of one, become X − offset.
     void load(const openvdb::FloatTree& x, float offset);

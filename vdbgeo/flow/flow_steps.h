@@ -15,9 +15,10 @@ class FlowSteps {
     virtual stencil::FieldSummary take(double dt) = 0;
 };
 
-/// Steps up to the time that the options ask for. Adds to the report's steps and time; its dt is the longest step.
-/// `before`: of X. Errors as geometric_flow.
-void take_flow_steps(FlowSteps& flow, const stencil::FieldSummary& before, const GeometricFlowOptions& options,
-                     HyperdiffusionReport& report, const Progress& progress);
+/// Steps up to the time that the options ask for. Adds to the report's steps and time; its dt is the longest
+/// step. `before`: of X. Errors as geometric_flow.
+void take_flow_steps(FlowSteps& flow, const stencil::FieldSummary& before,
+                     const GeometricFlowOptions& options, HyperdiffusionReport& report,
+                     const Progress& progress);
 
 }  // namespace vdbgeo

@@ -93,8 +93,9 @@ void GeometricFlowOptions::check() const {
 
 int geometric_flow_halo(const GeometricFlowOptions& options) { return (options.order + 8) / 8 * 8; }
 
-void take_flow_steps(FlowSteps& flow, const stencil::FieldSummary& before, const GeometricFlowOptions& options,
-                     HyperdiffusionReport& report, const Progress& progress) {
+void take_flow_steps(FlowSteps& flow, const stencil::FieldSummary& before,
+                     const GeometricFlowOptions& options, HyperdiffusionReport& report,
+                     const Progress& progress) {
     constexpr double safety = 0.9;
     report.mean_before = report.mean_after = before.mean();
     const double range = std::max(static_cast<double>(before.max) - before.min, 1e-30);

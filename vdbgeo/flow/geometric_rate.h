@@ -12,8 +12,8 @@ class GeometricRate {
  public:
     GeometricRate(const GeometricFlowOptions& options, const Vec3d& weights);
 
-    /// rate = S_t in the layout's own cells. Returns the largest row sum √g Σ w/√g over the faces of a voxel there.
-    /// `input`: X, where there is a fidelity.
+    /// rate = S_t in the layout's own cells. Returns the largest row sum √g Σ w/√g over the faces of a voxel
+    /// there. `input`: X, where there is a fidelity.
     double operator()(const stencil::BlockLayout& layout, const float* state, const float* input,
                       float* rate) const;
     /// The longest stable step, from the largest row sum of the whole map.

@@ -97,7 +97,8 @@ std::string HyperdiffusionOptions::text() const {
     std::string out = fmt::format("hyperdiffusion sigma {} {:a} {:a} {}", static_cast<int>(sigma.kind),
                                   sigma.value, sigma.factor, sigma.radius);
     for (const DiffusionTerm& t : terms) out += fmt::format(" term {} {:a}", t.order, t.diffusivity);
-    out += fmt::format(" stepper {} cycles {} fidelity {:a}", static_cast<int>(stepper), min_cycles, fidelity);
+    out +=
+        fmt::format(" stepper {} cycles {} fidelity {:a}", static_cast<int>(stepper), min_cycles, fidelity);
     if (time) out += fmt::format(" time {:a}", *time);
     if (steps) out += fmt::format(" steps {}", *steps);
     if (dt) out += fmt::format(" dt {:a}", *dt);
@@ -131,9 +132,9 @@ HyperdiffusionReport hyperdiffuse(openvdb::FloatGrid& grid, const Hyperdiffusion
     DiffusionSolver solver(grid, {{options.terms, options.fidelity}}, options.sigma, share);
     if (solver.active_voxels() == 0) return report;
     const double step = solver.step(options.stepper, options.dt);
-    report.resumed_cycles =
-        with_checkpoints(solver, checkpoint, options.text(), share ? share->team : nullptr,
-                         [&](CycleSolver& s) { take_cycles(s, options, step, report.noise, report, progress); });
+    report.resumed_cycles = with_checkpoints(
+        solver, checkpoint, options.text(), share ? share->team : nullptr,
+        [&](CycleSolver& s) { take_cycles(s, options, step, report.noise, report, progress); });
     solver.describe(report);
     if (report.steps) solver.store(grid);
     return report;

@@ -154,9 +154,8 @@ StateReader::StateReader(const std::vector<std::filesystem::path>& files, std::s
     : files_(std::make_unique<Files>()) {
     files_->fields = fields;
     for (const auto& path : files) files_->open(path);
-    tbb::parallel_sort(
-        files_->places.begin(), files_->places.end(),
-        [](const Files::Place& a, const Files::Place& b) { return a.origin < b.origin; });
+    tbb::parallel_sort(files_->places.begin(), files_->places.end(),
+                       [](const Files::Place& a, const Files::Place& b) { return a.origin < b.origin; });
 }
 
 StateReader::~StateReader() = default;

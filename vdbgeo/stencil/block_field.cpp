@@ -153,13 +153,12 @@ FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* tea
 }
 
 std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks) {
-    const auto of_cell =
-        sum_by_cell(layout, std::uint64_t(0), [&](std::size_t brick, std::uint64_t& sum) {
-            const openvdb::Coord& at = layout.origin(brick);
-            const std::uint64_t place = hash_of(&at, sizeof at, 0);
-            sum += hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
-                           hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
-        });
+    const auto of_cell = sum_by_cell(layout, std::uint64_t(0), [&](std::size_t brick, std::uint64_t& sum) {
+        const openvdb::Coord& at = layout.origin(brick);
+        const std::uint64_t place = hash_of(&at, sizeof at, 0);
+        sum += hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
+                       hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
+    });
     std::uint64_t sum = 0;
     for (const std::uint64_t value : of_cell) sum += value;
     return sum;

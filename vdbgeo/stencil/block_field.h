@@ -27,9 +27,9 @@ class BlockField {
     const float* brick(std::size_t i) const { return data_.get() + i * brick_size; }
     std::size_t memory() const { return bricks_ * brick_size * sizeof(float); }
 
-    /// As long as one of these lives, memory that fields give back is kept for the next: for who makes fields of
-    /// about the same sizes again and again, which would cost as much as using them. What is kept is given back
-    /// once a field does not fit into any of it. Of one thread at a time.
+    /// As long as one of these lives, memory that fields give back is kept for the next: for who makes fields
+    /// of about the same sizes again and again, which would cost as much as using them. What is kept is given
+    /// back once a field does not fit into any of it. Of one thread at a time.
     class Reuse {
      public:
         Reuse();

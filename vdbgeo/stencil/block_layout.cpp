@@ -56,9 +56,9 @@ BlockLayout::BlockLayout(const openvdb::FloatTree& tree, const std::optional<Coo
 }
 
 BlockLayout::BlockLayout(std::vector<LeafMask> leaves, const std::optional<CoordBBox>& own) {
-    leaves.erase(std::remove_if(leaves.begin(), leaves.end(),
-                                [](const LeafMask& l) { return l.mask == Mask{}; }),
-                 leaves.end());
+    leaves.erase(
+        std::remove_if(leaves.begin(), leaves.end(), [](const LeafMask& l) { return l.mask == Mask{}; }),
+        leaves.end());
     tbb::parallel_sort(leaves.begin(), leaves.end(), [](const LeafMask& a, const LeafMask& b) {
         return leaf_key(a.origin) < leaf_key(b.origin);
     });
@@ -67,8 +67,7 @@ BlockLayout::BlockLayout(std::vector<LeafMask> leaves, const std::optional<Coord
 
 /// Leaves come in their order.
 template <class LeafAt>
-void BlockLayout::take(std::size_t leaves, const std::optional<CoordBBox>& own,
-                       const LeafAt& leaf_at) {
+void BlockLayout::take(std::size_t leaves, const std::optional<CoordBBox>& own, const LeafAt& leaf_at) {
     if (leaves > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
         throw InvalidInput("the grid has more than 2^31 leaves");
     origins_.resize(leaves);

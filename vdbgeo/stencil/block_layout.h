@@ -51,8 +51,8 @@ class BlockLayout {
     /// `own`: the box of the cells to work on, at multiples of their size; unset: all.
     explicit BlockLayout(const openvdb::FloatTree& tree, const std::optional<openvdb::CoordBBox>& own = {});
 
-    /// The same of leaves that are listed: their first voxels, in any order, and their masks. Those whose mask
-    /// is empty are left out.
+    /// The same of leaves that are listed: their first voxels, in any order, and their masks. Those whose
+    /// mask is empty are left out.
     struct LeafMask {
         openvdb::Coord origin;
         Mask mask;

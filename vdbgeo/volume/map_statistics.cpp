@@ -171,9 +171,9 @@ void StatisticsOfParts::add(const openvdb::FloatGrid& part, const CoordBBox& own
 Statistics StatisticsOfParts::statistics(float background, Team* team) const {
     Moments all = joined(lines_, tiles_, team);
     if (!frame_.bounded()) return all.statistics();
-    const std::uint64_t seen = all.count + all.non_finite,
-                        samples = std::uint64_t(frame_.size.x()) * std::uint64_t(frame_.size.y()) *
-                                  std::uint64_t(frame_.size.z());
+    const std::uint64_t seen = all.count + all.non_finite, samples = std::uint64_t(frame_.size.x()) *
+                                                                     std::uint64_t(frame_.size.y()) *
+                                                                     std::uint64_t(frame_.size.z());
     if (samples > seen) all.join(many(background, samples - seen));
     return all.statistics();
 }

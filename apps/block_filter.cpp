@@ -29,7 +29,7 @@ std::filesystem::path scratch_of(const MapFilterFlags& flags) {
 /// What reading may take of the memory: strips of the file.
 MapReadOptions reading(const MapFilterFlags& flags) {
     MapReadOptions out = flags.map.options;
-    out.memory = out.memory_limit() / 4;
+    out.memory = std::max(out.memory_limit() / 4, 64 * megabyte);
     out.scratch = scratch_of(flags);
     return out;
 }

@@ -175,7 +175,7 @@ void move_surface(const FlowOptions& o, FilterInput& input, Run& run, Session& s
 }
 
 void run_flow(const FlowOptions& o, Session& session) {
-    const MemoryNeed need{"the flow", o.moves_surface() ? 4.2 : 16.2};
+    const MemoryNeed need{"the flow", o.moves_surface() ? 4.2 : 20.4};
     if (!o.moves_surface() && !session.team && o.files.preview.empty() && in_blocks(o.files, need))
         return move_density_in_blocks(o, session);
     Run run;

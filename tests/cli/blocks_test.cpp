@@ -70,7 +70,7 @@ TEST_F(Blocks, WhatNeedsTheWholeMapSaysSo) {
     const std::string map = noisy();
     for (const Words& more : {Words{"--preview", at("p.png")}, Words{"--stepper", "adi", "--time", "1"},
                               Words{"--method", "median"}}) {
-        Words words{"denoise", map, at("b.mrc"), "--memory", memory, "--quiet"};
+        Words words{"denoise", map, at("b.mrc"), "--memory", "150M", "--quiet"};
         words.insert(words.end(), more.begin(), more.end());
         expect_error(vdbgeo(words), 5, map + ": ", "--memory");
     }

@@ -1,5 +1,7 @@
 #include "apps/block_filter.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -37,7 +39,7 @@ MapReadOptions reading(const MapFilterFlags& flags) {
 /// What is left of the memory for blocks: the program itself, strips of the file and nodes of trees that come
 /// and go take the rest.
 std::uint64_t memory_for_blocks(std::uint64_t limit, std::uint64_t held) {
-    const std::uint64_t taken = 96 * megabyte + held + limit / 6;
+    const std::uint64_t taken = 128 * megabyte + held + limit / 6;
     return limit > taken ? limit - taken : 0;
 }
 
@@ -135,6 +137,7 @@ void BlockFilter::write(Json& result, Session& session) {
         store_frame(result_);
         meta = *result_.grid;
     };
+    malloc_trim(0);  // what the blocks took
     std::optional<MrcWriteReport> report;
     const Progress progress = session.stage("writing");
     if (vdb) {

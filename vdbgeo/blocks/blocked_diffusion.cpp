@@ -305,6 +305,7 @@ namespace {
 /// removable_noise of the whole, from the cells of its sample.
 double noise_of(const MapSource& source, std::uint64_t active) {
     constexpr int spacing = 8;
+    malloc_trim(0);
     FloatGrid::Ptr sample = FloatGrid::create();
     sample->setTransform(source.transform->copy());
     const Coord cell(BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z);

@@ -95,8 +95,8 @@ class LeafCounts {
 
 class Planner {
  public:
-    Planner(const CoordBBox& box, const BlockWork& work, double bytes, const BrickIndex* index)
-        : box_(box), cells_(to_cells(box)), work_(work), bytes_(bytes) {
+    Planner(const CoordBBox& box, const BlockWork& work, const BrickIndex* index)
+        : box_(box), cells_(to_cells(box)), work_(work) {
         if (index) counts_.emplace(cells_, *index);
     }
 
@@ -176,7 +176,6 @@ class Planner {
 
     CoordBBox box_, cells_;
     const BlockWork& work_;
-    double bytes_;
     std::optional<LeafCounts> counts_;
 };
 
@@ -205,7 +204,7 @@ std::vector<CoordBBox> blocks_of(const CoordBBox& box, const Coord& size, const 
 
 BlockPlan plan_blocks(const CoordBBox& box, const BlockWork& work, std::uint64_t bytes,
                       const BrickIndex* index) {
-    const Planner planner(box, work, double(bytes), index);
+    const Planner planner(box, work, index);
     double least = -1;
     for (const Planner::Candidate& c : planner.candidates()) {
         const double memory = planner.memory(c);

@@ -1,7 +1,5 @@
 #include "apps/block_filter.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <optional>
 
@@ -12,6 +10,7 @@
 #include "converters/map_parts.h"
 #include "converters/mrc_metadata.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/freed_memory.h"
 #include "vdbgeo/volume/leaf_layout.h"
 #include "vdbgeo/volume/map_statistics.h"
 
@@ -137,7 +136,7 @@ void BlockFilter::write(Json& result, Session& session) {
         store_frame(result_);
         meta = *result_.grid;
     };
-    malloc_trim(0);  // what the blocks took
+    give_memory_back();  // what the blocks took
     std::optional<MrcWriteReport> report;
     const Progress progress = session.stage("writing");
     if (vdb) {

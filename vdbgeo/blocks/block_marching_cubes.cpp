@@ -1,23 +1,12 @@
 #include "vdbgeo/blocks/block_marching_cubes.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 
+#include "vdbgeo/core/freed_memory.h"
+
 namespace vdbgeo {
-namespace {
 
 using openvdb::Coord;
-
-/// Gives back what the allocator keeps of a block that is gone: the next one's leaves are made by other
-/// threads, whose heaps cannot use it.
-void give_memory_back() {
-#ifdef __GLIBC__
-    malloc_trim(0);
-#endif
-}
-
-}  // namespace
 
 BlockMarchingCubes::BlockMarchingCubes(ReadBox read, const BlockLattice& lattice,
                                        const MarchingCubesOptions& options, const Progress& progress)

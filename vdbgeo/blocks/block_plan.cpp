@@ -19,17 +19,6 @@ constexpr std::array<int, 3> cell_size{BlockLayout::size_x, BlockLayout::size_y,
 
 int floor_to(int v, int size) { return (v >= 0 ? v / size : -((size - 1 - v) / size)) * size; }
 
-/// The cells that a box touches.
-CoordBBox to_cells(const CoordBBox& box) {
-    CoordBBox out;
-    for (int a = 0; a < 3; ++a) {
-        const int size = cell_size[static_cast<std::size_t>(a)];
-        out.min()[a] = floor_to(box.min()[a], size);
-        out.max()[a] = floor_to(box.max()[a], size) + size - 1;
-    }
-    return out;
-}
-
 double volume(const CoordBBox& b) {
     return b.empty() ? 0.0
                      : double(b.max().x() - b.min().x() + 1) * (b.max().y() - b.min().y() + 1) *
@@ -96,7 +85,7 @@ class LeafCounts {
 class Planner {
  public:
     Planner(const CoordBBox& box, const BlockWork& work, const BrickIndex* index)
-        : box_(box), cells_(to_cells(box)), work_(work) {
+        : box_(box), cells_(cells_of(box)), work_(work) {
         if (index) counts_.emplace(cells_, *index);
     }
 
@@ -132,7 +121,7 @@ class Planner {
             with_ghosts.expand(halo);
             with_ghosts.intersect(cells_);
             double leaves = volume(with_ghosts) / 512;
-            if (counts_) leaves = std::min(leaves, double(counts_->in(to_cells(with_ghosts))));
+            if (counts_) leaves = std::min(leaves, double(counts_->in(cells_of(with_ghosts))));
             const double rows = with_ghosts.max().y() - with_ghosts.min().y() + 1.0;
             const double window = std::min(1.0, 2 * cell_size[1] / rows);
             most = std::max(most, leaves * (work_.bytes_a_brick + window * work_.bytes_of_window));
@@ -181,13 +170,23 @@ class Planner {
 
 }  // namespace
 
+CoordBBox cells_of(const CoordBBox& box) {
+    CoordBBox out;
+    for (int a = 0; a < 3; ++a) {
+        const int size = cell_size[static_cast<std::size_t>(a)];
+        out.min()[a] = floor_to(box.min()[a], size);
+        out.max()[a] = floor_to(box.max()[a], size) + size - 1;
+    }
+    return out;
+}
+
 int block_halo(const BlockWork& work, int steps, bool first, bool last) {
     const int halo = steps * work.reach + (first ? work.first_reach : 0) + (last ? work.last_reach : 0);
     return (halo + 7) / 8 * 8;
 }
 
 std::vector<CoordBBox> blocks_of(const CoordBBox& box, const Coord& size, const BrickIndex* index) {
-    const CoordBBox cells = to_cells(box);
+    const CoordBBox cells = cells_of(box);
     std::optional<LeafCounts> counts;
     if (index) counts.emplace(cells, *index);
     std::vector<CoordBBox> out;

@@ -28,6 +28,9 @@ struct BlockPlan {
     std::vector<openvdb::CoordBBox> blocks;  ///< those that have leaves, by y, z, x
 };
 
+/// The cells that a box of voxels touches.
+openvdb::CoordBBox cells_of(const openvdb::CoordBBox& box);
+
 /// Ghosts around a block, in voxels and whole leaves, for some steps of a cycle.
 int block_halo(const BlockWork& work, int steps, bool first, bool last);
 

@@ -1,11 +1,10 @@
 #include "vdbgeo/blocks/blocked_diffusion.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/core/freed_memory.h"
 #include "vdbgeo/flow/checkpoint.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/noise.h"
@@ -182,7 +181,8 @@ void BlockedDiffusion::load(const Part& part, const BrickIndex::Part& bricks, co
         if (reads_input()) fields.load_input(map_.read(box)->tree(), offset_);
         for (std::size_t f = 0; f < now_.size(); ++f) now_[f].now->read(bricks.runs, fields.now(f));
     }
-    if (is_input_ || reads_input()) malloc_trim(0);  // what the grid took goes back before the fields grow
+    if (is_input_ || reads_input())
+        give_memory_back();  // what the grid took goes back before the fields grow
     fields.clear_rest();
     if (part.begins()) return;
     const std::vector<float*> d = fields.coefficients();
@@ -305,7 +305,7 @@ namespace {
 /// removable_noise of the whole, from the cells of its sample.
 double noise_of(const MapSource& source, std::uint64_t active) {
     constexpr int spacing = 8;
-    malloc_trim(0);
+    give_memory_back();
     FloatGrid::Ptr sample = FloatGrid::create();
     sample->setTransform(source.transform->copy());
     const Coord cell(BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z);

@@ -1,10 +1,9 @@
 #include "vdbgeo/blocks/blocked_flow.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <optional>
 
+#include "vdbgeo/core/freed_memory.h"
 #include "vdbgeo/core/parallel.h"
 
 namespace vdbgeo {
@@ -65,7 +64,7 @@ void BlockedFlow::take_block(const CoordBBox& own, float dt, stencil::FieldTotal
         state_.now->read(bricks.runs, state.brick(0));
     else
         stencil::load(layout, map_.read(box)->tree(), 0, state.brick(0));
-    if (!state_.now || options_.fidelity != 0) malloc_trim(0);  // what the grids took
+    if (!state_.now || options_.fidelity != 0) give_memory_back();  // what the grids took
     clear(rate);
     memory_ = std::max(memory_, layout.memory() + state.memory() + rate.memory());
     layout.work_on(cells_within(own, rate_of_.reach()));

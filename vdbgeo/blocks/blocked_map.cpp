@@ -26,12 +26,9 @@ BrickFile& next_of(BrickGenerations& field, const std::filesystem::path& scratch
 }
 
 CoordBBox cells_within(const CoordBBox& own, int reach) {
-    const auto down = [](int v, int size) { return (v >= 0 ? v / size : -((size - 1 - v) / size)) * size; };
     CoordBBox box = own;
     box.expand(reach);
-    box.min() = {down(box.min().x(), BlockLayout::size_x), down(box.min().y(), BlockLayout::size_y),
-                 down(box.min().z(), BlockLayout::size_z)};
-    return box;
+    return cells_of(box);
 }
 
 FloatGrid::Ptr BlockedMap::read(const CoordBBox& box) const {

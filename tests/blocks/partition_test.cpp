@@ -79,7 +79,10 @@ TEST(Partition, APartHasTheInactiveTilesThatTouchItsBox) {
     EXPECT_EQ(part->tree().getValue(Coord(7, 47, 0)), -1);
     EXPECT_EQ(part->tree().getValue(Coord(0, 200, 0)), -1);
     EXPECT_EQ(part->activeVoxelCount(), 0u);
-    EXPECT_EQ(part_of(*grid, {Coord(100), Coord(150)})->tree().getValue(Coord(0, 200, 0)), 7);
+    const auto other = part_of(*grid, {Coord(100), Coord(150)});
+    EXPECT_EQ(other->tree().getValue(Coord(100, 151, 100)), 7);
+    EXPECT_EQ(other->tree().getValue(Coord(100, 152, 100)), -1);
+    EXPECT_EQ(other->tree().getValue(Coord(0, 200, 0)), -1);
 }
 
 TEST(Partition, WithoutBorderEveryVoxelLiesInOneBox) {

@@ -38,6 +38,7 @@ struct RunOptions {
     int signal = SIGKILL;                                   ///< what is sent, where one of these is set:
     std::optional<std::chrono::milliseconds> signal_after;  ///< after the start, or
     std::optional<std::string> signal_at;  ///< once standard error has this text (empty: anything)
+    std::filesystem::path signal_by_file;  ///< once this file is there
     bool signal_heard = false;             ///< not before the program has a handler for it
     std::chrono::seconds give_up{240};     ///< then it is killed
 };
@@ -119,6 +120,8 @@ inline Ended run(const std::vector<std::string>& command, const RunOptions& opti
         if (options.signal_after && passed >= *options.signal_after) send(options.signal);
         if (options.signal_at && !result.err.empty() &&
             result.err.find(*options.signal_at) != std::string::npos)
+            send(options.signal);
+        if (!options.signal_by_file.empty() && std::filesystem::exists(options.signal_by_file))
             send(options.signal);
         if (passed > options.give_up) ::kill(pid, SIGKILL);
     }

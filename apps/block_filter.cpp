@@ -1,16 +1,19 @@
 #include "apps/block_filter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "apps/map_output.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
 #include "converters/leaf_source.h"
+#include "converters/map_blocks.h"
 #include "converters/map_parts.h"
 #include "converters/mrc_metadata.h"
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/freed_memory.h"
+#include "vdbgeo/flow/diffusion_fields.h"
 #include "vdbgeo/volume/leaf_layout.h"
 #include "vdbgeo/volume/map_statistics.h"
 
@@ -42,16 +45,36 @@ std::uint64_t memory_for_blocks(std::uint64_t limit, std::uint64_t held) {
     return limit > taken ? limit - taken : 0;
 }
 
-}  // namespace
+/// A map that is read, changed and written block by block.
+class BlockFilter {
+ public:
+    /// Opens the map and says what is odd about it.
+    BlockFilter(const MapFilterFlags& flags, Session& session);
 
-bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need) {
-    const MapReadOptions& options = flags.map.options;
-    if (flags.in == "-") return false;
-    if (is_map_parts(flags.in)) return true;
-    const auto samples = samples_in_file(flags, options.memory.has_value());
-    return samples && *samples * need.bytes_a_voxel > static_cast<double>(options.memory_limit()) &&
-           memory_for_blocks(options.memory_limit(), 0) > 0;
-}
+    const MapFile& in() const { return map_.whole(); }
+    MapSource source() const;
+    BlockOptions options() const;
+    /// NumericalError: no sample is kept.
+    [[noreturn]] void fail_empty() const;
+    /// Takes for the map's values those of a result, which has to live as long.
+    void finish(const BlockedResult& made, bool cleared, const std::string& history);
+    /// Writes the map and puts its statistics, and what there is to say of the file, into the result.
+    void write(Json& result, Session& session);
+    /// Of the new values, once they are written, and the sum of the squares of what changed.
+    const Statistics& statistics() const { return result_.statistics; }
+    const ExactSum& squared_change() const { return squared_change_; }
+
+ private:
+    Statistics statistics_by_slabs(const Progress& progress) const;
+    FloatGrid::Ptr changed(const CoordBBox& slab, ExactSum& squares) const;
+
+    const MapFilterFlags& flags_;
+    MapBlocks map_;
+    DensityMap result_;  // without voxels
+    const BlockedResult* made_ = nullptr;
+    bool cleared_ = false;
+    ExactSum squared_change_;
+};
 
 BlockFilter::BlockFilter(const MapFilterFlags& flags, Session& session)
     : flags_(flags), map_(flags.in, reading(flags), session.stage("opening")) {
@@ -76,18 +99,21 @@ BlockOptions BlockFilter::options() const {
     return out;
 }
 
-void BlockFilter::fail_empty() const { need_samples(flags_.in, Moments(), map_.statistics()); }
+void BlockFilter::fail_empty() const {
+    need_samples(flags_.in, Moments(), map_.statistics());
+    throw NumericalError(flags_.in + ": no sample is kept");
+}
 
-FloatGrid::Ptr BlockFilter::changed(const CoordBBox& slab) const {
+FloatGrid::Ptr BlockFilter::changed(const CoordBBox& slab, ExactSum& squares) const {
     FloatGrid::Ptr part = map_.read(slab).grid;
     if (part->tree().hasActiveTiles()) part->tree().voxelizeActiveTiles();
-    store_(slab, part->tree());
+    squares.add(made_->store(slab, part->tree()));
     if (cleared_) clear_inactive(*part);
     return part;
 }
 
-void BlockFilter::finish(Store store, bool cleared, const std::string& history) {
-    store_ = std::move(store);
+void BlockFilter::finish(const BlockedResult& made, bool cleared, const std::string& history) {
+    made_ = &made;
     cleared_ = cleared;
     result_ = in().map;
     result_.grid = in().map.grid->copyWithNewTree();
@@ -105,7 +131,8 @@ Statistics BlockFilter::statistics_by_slabs(const Progress& progress) const {
     for (int z = begin; z <= end; z += leaf::dim) {
         slab.min().z() = z;
         slab.max().z() = z + leaf::dim - 1;
-        all.add(*changed(slab), slab);
+        ExactSum counted_before;
+        all.add(*changed(slab, counted_before), slab);
         progress.report(double(z - begin + leaf::dim) / double(end - begin + leaf::dim));
     }
     return all.statistics(result_.grid->background());
@@ -120,13 +147,15 @@ void BlockFilter::write(Json& result, Session& session) {
     leaves.background = result_.grid->background();
     leaves.active_box = map_.box();
     const int axis = vdb ? 2 : recall_mrc_metadata(leaves.meta).order[2];
-    // Statistics are found on the way where slabs lie along z; some outputs ask for a slab more than once.
+    // Statistics are found on the way where slabs lie along z. Some outputs ask for a slab more than once.
     StatisticsOfParts all(result_.frame);
-    int next = map_.box().min().z() / leaf::dim * leaf::dim;
+    int next = map_.box().min()[axis] / leaf::dim * leaf::dim;
     leaves.finder = slab_finder(axis, map_.box(), [&](const CoordBBox& slab) {
-        FloatGrid::Ptr part = changed(slab);
-        if (axis == 2 && slab.min().z() == next) {
-            all.add(*part, slab);
+        ExactSum squares;
+        FloatGrid::Ptr part = changed(slab, squares);
+        if (slab.min()[axis] == next) {
+            squared_change_.add(squares);
+            if (axis == 2) all.add(*part, slab);
             next += leaf::dim;
         }
         return part;
@@ -149,6 +178,45 @@ void BlockFilter::write(Json& result, Session& session) {
     session.end_stage();
     result.update(statistics_json(result_.statistics));
     if (report) report_written(flags_.out, *report, result, session);
+}
+
+}  // namespace
+
+bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need) {
+    const MapReadOptions& options = flags.map.options;
+    if (flags.in == "-") return false;
+    if (is_map_parts(flags.in)) return true;
+    const auto samples = samples_in_file(flags, options.memory.has_value());
+    return samples && *samples * need.bytes_a_voxel > static_cast<double>(options.memory_limit()) &&
+           memory_for_blocks(options.memory_limit(), 0) > 0;
+}
+
+BlockedOutcome filter_in_blocks(const MapFilterFlags& flags, const BlockedCommand& command, Session& session) {
+    give_large_memory_back_at_once();
+    BlockedOutcome out;
+    Clock clock;
+    BlockFilter filter(flags, session);
+    need_density(flags.in, filter.in());
+    out.seconds["read"] = clock.lap();
+    BlockOptions blocks = filter.options();
+    const auto compute = [&] {
+        return naming(flags.in, [&] {
+            return command.compute(filter.source(), blocks, out.report, session.stage(command.stage));
+        });
+    };
+    if (command.checkpoints) blocks.checkpoint = command.checkpoints->options;
+    const auto made = command.checkpoints ? command.checkpoints->run(session, compute) : compute();
+    if (!made) filter.fail_empty();
+    filter.finish(*made, command.cleared, command.history(out.report));
+    out.seconds["compute"] = clock.lap();
+    out.result = filter_result(flags, filter.in());
+    filter.write(out.result, session);
+    out.seconds["write"] = clock.lap();
+    if (command.checkpoints) command.checkpoints->remove(session);
+    out.report.removed = root_mean_square(filter.squared_change(), out.report.active_voxels);
+    out.statistics = filter.statistics();
+    out.deviation = std::sqrt(made->before().variance());
+    return out;
 }
 
 }  // namespace vdbgeo::app

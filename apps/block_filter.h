@@ -2,10 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
+#include "apps/flow_flags.h"
 #include "apps/map_filter.h"
-#include "converters/map_blocks.h"
 #include "vdbgeo/blocks/blocked_map.h"
 
 namespace vdbgeo::app {
@@ -15,34 +16,27 @@ namespace vdbgeo::app {
 /// --memory is given; else they are counted once they are read.
 bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need);
 
-class BlockFilter {
- public:
-    /// Opens the map and says what is odd about it.
-    BlockFilter(const MapFilterFlags& flags, Session& session);
-
-    const MapFile& in() const { return map_.whole(); }
-    MapSource source() const;
-    BlockOptions options() const;
-    /// NumericalError: no sample is kept.
-    void fail_empty() const;
-    /// Takes for the map's values those that `store` writes into the leaves of a part which begin in a box.
-    /// `cleared`: clear_inactive.
-    using Store = std::function<void(const openvdb::CoordBBox& box, openvdb::FloatTree& part)>;
-    void finish(Store store, bool cleared, const std::string& history);
-    /// Writes the map and puts its statistics, and what there is to say of the file, into the result.
-    void write(Json& result, Session& session);
-    /// Of the new values, once they are written.
-    const Statistics& statistics() const { return result_.statistics; }
-
- private:
-    Statistics statistics_by_slabs(const Progress& progress) const;
-    openvdb::FloatGrid::Ptr changed(const openvdb::CoordBBox& slab) const;
-
-    const MapFilterFlags& flags_;
-    MapBlocks map_;
-    DensityMap result_;  // without voxels
-    Store store_;
-    bool cleared_ = false;
+/// What is made of a map, and how it is noted.
+struct BlockedCommand {
+    std::string stage;
+    /// The computation; null where no sample is kept.
+    std::function<std::unique_ptr<BlockedResult>(const MapSource&, const BlockOptions&, HyperdiffusionReport&,
+                                                 const Progress&)>
+        compute;
+    std::function<std::string(const HyperdiffusionReport&)> history;
+    const CheckpointFlags* checkpoints = nullptr;
+    bool cleared = false;  ///< clear_inactive
 };
+
+struct BlockedOutcome {
+    HyperdiffusionReport report;
+    Statistics statistics;     ///< of the new map
+    double deviation = 0;      ///< of the values there were
+    Json result;               ///< filter_result, statistics_json, what there is to say of the file
+    Json seconds;              ///< read, compute, write
+};
+
+/// Reads the map block by block, computes, and writes what comes out.
+BlockedOutcome filter_in_blocks(const MapFilterFlags& flags, const BlockedCommand& command, Session& session);
 
 }  // namespace vdbgeo::app

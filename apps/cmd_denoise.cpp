@@ -195,34 +195,24 @@ bool draws(const DenoiseOptions& o) {
 
 /// A map that does not fit into memory.
 void run_denoise_in_blocks(const DenoiseOptions& o, Session& session) {
-    Json seconds;
-    Clock clock;
-    BlockFilter filter(o.files, session);
-    need_density(o.files.in, filter.in());
-    seconds["read"] = clock.lap();
-    HyperdiffusionReport report;
-    BlockOptions blocks = filter.options();
-    blocks.checkpoint = o.checkpoints.options;
-    const auto solver = o.checkpoints.run(session, [&] {
-        return naming(o.files.in, [&] {
-            return hyperdiffuse_blocks(filter.source(), o.diffusion.options, blocks, report,
-                                       session.stage("denoising"));
-        });
-    });
-    if (!solver) filter.fail_empty();
-    const Outcome outcome = outcome_of(o, report);
-    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
-                  false, fmt::format("denoised: {}, {}", o.method, outcome.history));
-    seconds["compute"] = clock.lap();
-    Json j = filter_result(o.files, filter.in());
+    BlockedCommand command;
+    command.stage = "denoising";
+    command.compute = [&](const MapSource& source, const BlockOptions& blocks, HyperdiffusionReport& report,
+                          const Progress& progress) {
+        return hyperdiffuse_blocks(source, o.diffusion.options, blocks, report, progress);
+    };
+    command.history = [&](const HyperdiffusionReport& report) {
+        return fmt::format("denoised: {}, {}", o.method, outcome_of(o, report).history);
+    };
+    command.checkpoints = &o.checkpoints;
+    BlockedOutcome done = filter_in_blocks(o.files, command, session);
+    const Outcome outcome = outcome_of(o, done.report);
+    Json& j = done.result;
     j["method"] = o.method;
     j.update(outcome.numbers);
     j["removed"] = outcome.removed;
-    filter.write(j, session);
-    seconds["write"] = clock.lap();
-    o.checkpoints.remove(session);
-    j["seconds"] = seconds;
-    say_outcome(outcome, j, std::sqrt(solver->before().variance()), session);
+    j["seconds"] = done.seconds;
+    say_outcome(outcome, j, done.deviation, session);
     warn_unchanged(o, j, outcome, session);
     session.result(j);
 }

@@ -29,10 +29,7 @@ std::string history_of(const HighPassOptions& options, const HyperdiffusionRepor
 }
 
 /// What was chosen and done.
-Json result_of(const EdgesOptions& o, const MapFile& in, const HyperdiffusionReport& r,
-               const Statistics& statistics) {
-    const HighPassOptions& options = o.high_pass.options;
-    Json j = filter_result(o.files, in);
+void add_result(const HighPassOptions& options, const HyperdiffusionReport& r, Json& j) {
     j.update({{"order", options.order},
               {"slow", options.slow},
               {"fast", options.fast},
@@ -41,8 +38,6 @@ Json result_of(const EdgesOptions& o, const MapFile& in, const HyperdiffusionRep
               {"sigma", options.sigma.text()},
               {"stepper", name_of(options.stepper)}});
     j.update(report_json(r));
-    j.update(statistics_json(statistics));
-    return j;
 }
 
 void say_result(const HighPassOptions& options, const HyperdiffusionReport& r, const Statistics& statistics,
@@ -60,30 +55,20 @@ void say_result(const HighPassOptions& options, const HyperdiffusionReport& r, c
 /// A map that does not fit into memory.
 void run_edges_in_blocks(const EdgesOptions& o, Session& session) {
     const HighPassOptions& options = o.high_pass.options;
-    Json seconds;
-    Clock clock;
-    BlockFilter filter(o.files, session);
-    need_density(o.files.in, filter.in());
-    seconds["read"] = clock.lap();
-    HyperdiffusionReport report;
-    BlockOptions blocks = filter.options();
-    blocks.checkpoint = o.checkpoints.options;
-    const auto solver = o.checkpoints.run(session, [&] {
-        return naming(o.files.in, [&] {
-            return coupled_high_pass_blocks(filter.source(), options, blocks, report, session.stage("edges"));
-        });
-    });
-    if (!solver) filter.fail_empty();
-    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { solver->store(box, part); },
-                  true, history_of(options, report));
-    seconds["compute"] = clock.lap();
-    Json j = result_of(o, filter.in(), report, filter.statistics());
-    filter.write(j, session);
-    seconds["write"] = clock.lap();
-    o.checkpoints.remove(session);
-    j["seconds"] = seconds;
-    say_result(options, report, filter.statistics(), session);
-    session.result(j);
+    BlockedCommand command;
+    command.stage = "edges";
+    command.compute = [&](const MapSource& source, const BlockOptions& blocks, HyperdiffusionReport& report,
+                          const Progress& progress) {
+        return coupled_high_pass_blocks(source, options, blocks, report, progress);
+    };
+    command.history = [&](const HyperdiffusionReport& report) { return history_of(options, report); };
+    command.checkpoints = &o.checkpoints;
+    command.cleared = true;
+    BlockedOutcome done = filter_in_blocks(o.files, command, session);
+    add_result(options, done.report, done.result);
+    done.result["seconds"] = done.seconds;
+    say_result(options, done.report, done.statistics, session);
+    session.result(done.result);
 }
 
 void run_edges(const EdgesOptions& o, Session& session) {
@@ -111,7 +96,9 @@ void run_edges(const EdgesOptions& o, Session& session) {
     clear_inactive(*in.map.grid);
     finish_map(input, history_of(options, r));
     seconds["compute"] = clock.lap();
-    Json j = result_of(o, in, r, in.map.statistics);
+    Json j = filter_result(o.files, in);
+    add_result(options, r, j);
+    j.update(statistics_json(in.map.statistics));
     if (shown) preview.add("edges", in.map, Preview::Greys::own, session.stage("preview"));
     clock.lap();
     write_filtered(o.files, input, r.bytes_sent, j, session);

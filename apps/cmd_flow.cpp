@@ -104,27 +104,18 @@ void move_density(const FlowOptions& o, FilterInput& input, Run& run, Session& s
 /// A map that does not fit into memory.
 void move_density_in_blocks(const FlowOptions& o, Session& session) {
     const GeometricFlowOptions& options = o.flow.density;
-    Json seconds;
-    Clock clock;
-    BlockFilter filter(o.files, session);
-    need_density(o.files.in, filter.in());
-    seconds["read"] = clock.lap();
-    HyperdiffusionReport report;
-    const auto flow = naming(o.files.in, [&] {
-        return geometric_flow_blocks(filter.source(), options, filter.options(), report,
-                                     session.stage("flow"));
-    });
-    if (!flow) filter.fail_empty();
-    filter.finish([&](const openvdb::CoordBBox& box, openvdb::FloatTree& part) { flow->store(box, part); },
-                  false, history_of(options, report));
-    seconds["compute"] = clock.lap();
-    Json j = filter_result(o.files, filter.in());
-    add_flow(options, report, j);
-    filter.write(j, session);
-    seconds["write"] = clock.lap();
-    j["seconds"] = seconds;
-    say_flow(options, report, session);
-    session.result(j);
+    BlockedCommand command;
+    command.stage = "flow";
+    command.compute = [&](const MapSource& source, const BlockOptions& blocks, HyperdiffusionReport& report,
+                          const Progress& progress) {
+        return geometric_flow_blocks(source, options, blocks, report, progress);
+    };
+    command.history = [&](const HyperdiffusionReport& report) { return history_of(options, report); };
+    BlockedOutcome done = filter_in_blocks(o.files, command, session);
+    add_flow(options, done.report, done.result);
+    done.result["seconds"] = done.seconds;
+    say_flow(options, done.report, session);
+    session.result(done.result);
 }
 
 /// The level set that is to move: the grid itself, or the one of an isosurface.

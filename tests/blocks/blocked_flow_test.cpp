@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <mutex>
 
 #include "tests/blocks/noisy_map.h"
+#include "tests/blocks/results.h"
 #include "tests/support/temp_folder.h"
 #include "tests/support/thread_team.h"
 #include "vdbgeo/blocks/partition.h"
@@ -51,15 +51,6 @@ void expect_same(const HyperdiffusionReport& expected, const HyperdiffusionRepor
     EXPECT_EQ(expected.active_voxels, given.active_voxels);
 }
 
-std::uint64_t different(const FloatGrid& a, const FloatGrid& b, const CoordBBox& where) {
-    std::uint64_t n = 0;
-    for (auto it = a.cbeginValueOn(); it; ++it) {
-        const float value = b.tree().getValue(it.getCoord());
-        n += where.isInside(it.getCoord()) && std::memcmp(&*it, &value, sizeof value) != 0;
-    }
-    return n;
-}
-
 TEST(BlockedFlow, HasTheBitsOfOneGrid) {
     const FloatGrid::Ptr input = test::noisy_map(box);
     const test::TempFolder folder;
@@ -68,7 +59,7 @@ TEST(BlockedFlow, HasTheBitsOfOneGrid) {
         const FloatGrid::Ptr expected = input->deepCopy();
         const HyperdiffusionReport alone = geometric_flow(*expected, setting.options);
         ASSERT_GT(alone.steps, 1);
-        EXPECT_GT(different(*expected, *input, CoordBBox::inf()), 1000u);
+        EXPECT_GT(test::different(*expected, *input), 1000u);
         const MapSource source{box, input->constTransformPtr(),
                                [&](const CoordBBox& wanted) { return part_of(*input, wanted); }};
         for (const Coord& size : {Coord(32, 32, 128), Coord(64, 64, 128), Coord(64, 32, 256)}) {
@@ -77,10 +68,8 @@ TEST(BlockedFlow, HasTheBitsOfOneGrid) {
                 geometric_flow_blocks(source, setting.options, {0, folder.path(), size, {}, {}}, report);
             ASSERT_TRUE(flow);
             EXPECT_GT(report.blocks, 1u);
+            EXPECT_EQ(test::different(*expected, *test::stored(*flow, *input, report)), 0u);
             expect_same(alone, report);
-            const FloatGrid::Ptr made = input->deepCopy();
-            flow->store(CoordBBox::inf(), made->tree());
-            EXPECT_EQ(different(*expected, *made, CoordBBox::inf()), 0u);
         }
     }
 }
@@ -101,7 +90,7 @@ TEST(TeamFlow, HasTheBitsOfOneGrid) {
                 const std::lock_guard<std::mutex> lock(mutex);
                 expect_same(alone, report);
                 EXPECT_GT(report.bytes_sent, 0u);
-                EXPECT_EQ(different(*part, *expected, share.own()), 0u);
+                EXPECT_EQ(test::different(*part, *expected, share.own()), 0u);
             });
         }
     }

@@ -5,10 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cstring>
 #include <mutex>
 
 #include "tests/blocks/noisy_map.h"
+#include "tests/blocks/results.h"
 #include "tests/support/temp_folder.h"
 #include "tests/support/thread_team.h"
 #include "vdbgeo/blocks/blocked_diffusion.h"
@@ -57,8 +57,7 @@ Run by_team(std::pair<int, int> parts) {
             const HyperdiffusionReport report = hyperdiffuse(*part, options, {}, &share, checkpoint);
             const std::lock_guard<std::mutex> lock(mutex);
             made.report = report;
-            for (auto it = part->cbeginValueOn(); it; ++it)
-                if (share.own().isInside(it.getCoord())) made.grid->tree().setValue(it.getCoord(), *it);
+            test::put_in(*part, share.own(), *made.grid);
         });
         return made;
     };
@@ -69,11 +68,11 @@ Run in_blocks(const Coord& size) {
         const test::TempFolder scratch;
         const MapSource source{box, input().constTransformPtr(),
                                [](const CoordBBox& wanted) { return part_of(input(), wanted); }};
-        Made made{input().deepCopy(), {}};
+        Made made;
         BlockOptions blocks{0, scratch.path(), size, {}, {}};
         blocks.checkpoint = checkpoint;
         const auto solver = hyperdiffuse_blocks(source, options, blocks, made.report);
-        solver->store(CoordBBox::inf(), made.grid->tree());
+        made.grid = test::stored(*solver, input(), made.report);
         return made;
     };
 }
@@ -84,12 +83,7 @@ void expect_same(const Made& expected, const Made& made) {
     EXPECT_EQ(made.report.time, expected.report.time);
     EXPECT_EQ(made.report.removed, expected.report.removed);
     EXPECT_EQ(made.report.mean_after, expected.report.mean_after);
-    std::uint64_t different = 0;
-    for (auto it = expected.grid->cbeginValueOn(); it; ++it) {
-        const float value = made.grid->tree().getValue(it.getCoord());
-        different += std::memcmp(&*it, &value, sizeof value) != 0;
-    }
-    EXPECT_EQ(different, 0u);
+    EXPECT_EQ(test::different(*expected.grid, *made.grid), 0u);
 }
 
 HyperdiffusionOptions fixed_steps() {

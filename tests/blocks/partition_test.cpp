@@ -14,7 +14,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-TEST(Partition, CoversEachCellOnce) {
+TEST(Partition, CoversEachUnitOnce) {
     const CoordBBox box(Coord(-40, -33, -129), Coord(100, 250, 300));
     for (const auto& parts : std::vector<std::pair<int, int>>{{1, 1}, {3, 1}, {1, 3}, {4, 2}, {10, 4}}) {
         const auto boxes = partition(box, parts);
@@ -22,9 +22,9 @@ TEST(Partition, CoversEachCellOnce) {
         std::uint64_t voxels = 0;
         CoordBBox all;
         for (const CoordBBox& b : boxes) {
-            EXPECT_EQ(b.min().y() & 31, 0);
+            EXPECT_EQ(b.min().y() & 7, 0);
             EXPECT_EQ(b.min().z() & 127, 0);
-            EXPECT_EQ((b.max().y() + 1) & 31, 0);
+            EXPECT_EQ((b.max().y() + 1) & 7, 0);
             EXPECT_EQ((b.max().z() + 1) & 127, 0);
             voxels += b.volume();
             all.expand(b);
@@ -35,25 +35,26 @@ TEST(Partition, CoversEachCellOnce) {
     }
 }
 
-TEST(Partition, PartsDifferByACellAtMost) {
+TEST(Partition, PartsDifferByAUnitAtMost) {
     const CoordBBox box(Coord(0), Coord(9, 1023, 9));
     const auto boxes = partition(box, {7, 1});
     const auto [least, most] =
         std::minmax_element(boxes.begin(), boxes.end(),
                             [](const CoordBBox& a, const CoordBBox& b) { return a.dim().y() < b.dim().y(); });
-    EXPECT_EQ(most->dim().y() - least->dim().y(), 32);
+    EXPECT_EQ(most->dim().y() - least->dim().y(), 8);
 }
 
 TEST(Partition, ChoosesTheEvenest) {
-    const CoordBBox box(Coord(0), Coord(299, 279, 259));  // 9 × 3 cells
+    const CoordBBox box(Coord(0), Coord(299, 279, 259));  // 35 × 3 units, the last of z with 4 voxels
     EXPECT_EQ(parts_for(box, 1), std::pair(1, 1));
-    EXPECT_EQ(parts_for(box, 2), std::pair(2, 1));
-    EXPECT_EQ(parts_for(box, 3), std::pair(1, 3)) << "as even as 3 x 1, with less border";
+    EXPECT_EQ(parts_for(box, 2), std::pair(1, 2)) << "128 and 132 sections";
+    EXPECT_EQ(parts_for(box, 3), std::pair(3, 1)) << "of 1 x 3 one part would have four sections";
     EXPECT_EQ(parts_for(box, 7), std::pair(7, 1));
-    EXPECT_EQ(parts_for(box, 27), std::pair(9, 3));
-    EXPECT_THROW(parts_for(box, 11), InvalidInput);
-    EXPECT_THROW(parts_for(box, 28), InvalidInput);
-    EXPECT_THROW(partition(box, {10, 1}), InvalidInput);
+    EXPECT_EQ(parts_for(box, 27), std::pair(9, 3)) << "27 parts of one or two leaves are mostly ghosts";
+    EXPECT_EQ(parts_for(box, 105), std::pair(35, 3));
+    EXPECT_THROW(parts_for(box, 37), InvalidInput);
+    EXPECT_THROW(parts_for(box, 106), InvalidInput);
+    EXPECT_THROW(partition(box, {36, 1}), InvalidInput);
     EXPECT_THROW(partition(box, {0, 1}), InvalidInput);
 }
 

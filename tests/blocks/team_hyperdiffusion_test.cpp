@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/blocks/noisy_map.h"
+#include "tests/blocks/results.h"
 #include "tests/support/thread_team.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
@@ -45,11 +46,8 @@ TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
             EXPECT_EQ(report.removed, told.removed);
             EXPECT_EQ(report.mean_after, told.mean_after);
             EXPECT_EQ(report.active_voxels, told.active_voxels);
-            for (auto it = part->cbeginValueOn(); it; ++it) {
-                const float wanted = grid->tree().getValue(it.getCoord());
-                different += std::memcmp(&*it, &wanted, sizeof wanted) != 0;
-                seen += share.own().isInside(it.getCoord());
-            }
+            different += test::different(*part, *grid);
+            for (auto it = part->cbeginValueOn(); it; ++it) seen += share.own().isInside(it.getCoord());
         });
         EXPECT_EQ(different, 0u);
         EXPECT_EQ(seen, expected->activeVoxelCount());
@@ -58,7 +56,7 @@ TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
 
 INSTANTIATE_TEST_SUITE_P(Shares, TeamHyperdiffusion,
                          ::testing::Values(std::pair(1, 1), std::pair(2, 1), std::pair(1, 2), std::pair(2, 2),
-                                           std::pair(5, 1), std::pair(6, 3)),
+                                           std::pair(5, 1), std::pair(6, 3), std::pair(13, 1)),
                          [](const auto& p) {
                              return std::to_string(p.param.first) + "_by_" + std::to_string(p.param.second);
                          });

@@ -85,13 +85,11 @@ class ThreadTeam {
                 for (std::size_t k = i; k < all.size(); k += n) numbers[i] += all[k];
             }
         }
-        void send(int to, int tag, std::vector<float> data) override {
-            const std::lock_guard<std::mutex> lock(team_.mutex_);
-            team_.mail_[{rank_, to, tag}].push_back(std::move(data));
-            team_.changed_.notify_all();
+        std::unique_ptr<Outgoing> outgoing(int to, int tag) override {
+            return std::make_unique<Sender>(team_, Key{rank_, to, tag});
         }
-        std::unique_ptr<Incoming> expect(int from, int tag, std::size_t count) override {
-            return std::make_unique<Letter>(team_, Key{from, rank_, tag}, count);
+        std::unique_ptr<Incoming> incoming(int from, int tag) override {
+            return std::make_unique<Receiver>(team_, Key{from, rank_, tag});
         }
 
      private:
@@ -99,23 +97,45 @@ class ThreadTeam {
         int rank_;
     };
 
-    class Letter : public Team::Incoming {
+    class Sender : public Team::Outgoing {
      public:
-        Letter(ThreadTeam& team, Key key, std::size_t count) : team_(team), key_(key), count_(count) {}
-        std::vector<float> take() override {
-            std::unique_lock<std::mutex> lock(team_.mutex_);
-            auto& letters = team_.mail_[key_];
-            team_.changed_.wait(lock, [&] { return !letters.empty(); });
-            std::vector<float> data = std::move(letters.front());
-            letters.pop_front();
-            if (data.size() != count_) throw std::logic_error("a message of another length was expected");
-            return data;
+        Sender(ThreadTeam& team, Key key) : team_(team), key_(key) {}
+        float* buffer(std::size_t count) override {
+            letter_.resize(count);
+            return letter_.data();
+        }
+        void send() override {
+            const std::lock_guard<std::mutex> lock(team_.mutex_);
+            team_.mail_[key_].push_back(letter_);
+            team_.changed_.notify_all();
         }
 
      private:
         ThreadTeam& team_;
         Key key_;
-        std::size_t count_;
+        std::vector<float> letter_;
+    };
+
+    class Receiver : public Team::Incoming {
+     public:
+        Receiver(ThreadTeam& team, Key key) : team_(team), key_(key) {}
+        void expect(std::size_t count) override { count_ = count; }
+        const float* take() override {
+            std::unique_lock<std::mutex> lock(team_.mutex_);
+            auto& letters = team_.mail_[key_];
+            team_.changed_.wait(lock, [&] { return !letters.empty(); });
+            letter_ = std::move(letters.front());
+            letters.pop_front();
+            if (letter_.size() != count_)
+                throw std::logic_error("a message of another length was expected");
+            return letter_.data();
+        }
+
+     private:
+        ThreadTeam& team_;
+        Key key_;
+        std::size_t count_ = 0;
+        std::vector<float> letter_;
     };
 
     int size_, arrived_ = 0, round_ = 0;

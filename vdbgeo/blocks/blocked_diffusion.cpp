@@ -9,7 +9,6 @@
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/noise.h"
 #include "vdbgeo/flow/state_file.h"
-#include "vdbgeo/stencil/cell_sums.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/tiles.h"
 
@@ -22,6 +21,16 @@ using stencil::BlockField;
 using stencil::BlockLayout;
 using stencil::FieldTotal;
 using stencil::GradientTotal;
+
+namespace {
+
+BlockField zeros(std::size_t bricks) {
+    BlockField field(bricks);
+    std::fill_n(field.brick(0), bricks * BlockField::brick_size, 0.0f);
+    return field;
+}
+
+}  // namespace
 
 /// Some steps of a cycle.
 struct BlockedDiffusion::Part {
@@ -72,9 +81,7 @@ void BlockedDiffusion::find_edges(const Progress& progress) {
     Totals totals(problem_);
     const BlockPlan plan = map_.reading_plan(1);
     for (std::size_t i = 0; i < plan.blocks.size(); ++i) {
-        CoordBBox box = plan.blocks[i];
-        box.expand(plan.halo);
-        const FloatGrid::Ptr grid = map_.read(box);
+        const FloatGrid::Ptr grid = map_.read(grown(plan.blocks[i], plan.halo));
         const BlockLayout layout(grid->tree(), plan.blocks[i]);
         BlockField x(layout.brick_count());
         stencil::load(layout, grid->tree(), offset_, x.brick(0));
@@ -150,8 +157,7 @@ void BlockedDiffusion::cycle(Stepper stepper, int n, double tau, const Progress&
 }
 
 void BlockedDiffusion::take_part(const Part& part, const CoordBBox& own, Totals& totals) {
-    CoordBBox box = own;
-    box.expand(part.halo);
+    const CoordBBox box = grown(own, part.halo);
     const BrickIndex::Part bricks = map_.index().part(box);
     DiffusionFields fields(problem_, BlockLayout(bricks.leaves, own));
     most_memory_ = std::max(most_memory_, fields.memory());
@@ -159,11 +165,11 @@ void BlockedDiffusion::take_part(const Part& part, const CoordBBox& own, Totals&
     const int after = part.ends() ? part.work->last_reach : 0, reach = part.work->reach;
     BlockLayout& layout = fields.layout();
     if (part.begins()) {
-        layout.work_on(cells_within(own, part.steps_from(part.first) * reach + after));
+        layout.work_on(grown(own, part.steps_from(part.first) * reach + after));
         fields.freeze(measure_);
     }
     for (std::size_t s = part.first; s < part.last; ++s) {
-        layout.work_on(cells_within(own, part.steps_from(s + 1) * reach + after));
+        layout.work_on(grown(own, part.steps_from(s + 1) * reach + after));
         stencil::SweepPlan plan = fields.plan((*part.sweeps)[s]);
         sweep(layout, plan);
     }
@@ -219,7 +225,14 @@ void BlockedDiffusion::reset() {
 }
 
 double BlockedDiffusion::removed() {
-    return is_input_ ? 0 : map_.removed(*now_[0].now, offset_, active_voxels());
+    if (is_input_) return 0;
+    ExactSum squares;
+    for (const CoordBBox& own : map_.reading_plan(0).blocks) {
+        const FloatGrid::Ptr x = map_.read(own);
+        const BlockedMap::Field u = map_.field_in(own, *now_[0].now);
+        squares.add(squared_change(u.layout, x->tree(), offset_, u.values.brick(0)));
+    }
+    return root_mean_square(squares, active_voxels());
 }
 
 /// For what goes through all fields, a block at a time.
@@ -252,9 +265,7 @@ void BlockedDiffusion::load(const StateReader& reader) {
     for (BrickGenerations& g : now_)
         if (!g.now) g.now = std::make_unique<BrickFile>(map_.options().scratch);
     for (const CoordBBox& own : plan.blocks) {
-        CoordBBox box = own;
-        box.expand(plan.halo);
-        const BrickIndex::Part bricks = map_.index().part(box);
+        const BrickIndex::Part bricks = map_.index().part(grown(own, plan.halo));
         const BlockLayout layout(bricks.leaves, own);
         std::vector<BlockField> fields;
         std::vector<float*> now;
@@ -272,32 +283,33 @@ void BlockedDiffusion::load(const StateReader& reader) {
     keep(totals);
 }
 
-void BlockedDiffusion::describe(HyperdiffusionReport& report) {
+void BlockedDiffusion::describe(HyperdiffusionReport& report) const {
     report.active_voxels = active_voxels();
     report.mean_before = before_.mean() + offset_;
     report.mean_after = summary_[0].mean() + offset_;
     report.state_bytes = most_memory_ + map_.index().memory();
-    report.removed = removed();
     report.blocks = most_blocks_;
 }
 
-void BlockedDiffusion::store(const CoordBBox& box, openvdb::FloatTree& part) const {
-    if (is_input_ && problem_.fields.size() == 1) return;
-    const BrickIndex::Part bricks = map_.index().part(box);
-    const BlockLayout layout(bricks.leaves);
-    BlockField u(layout.brick_count());
-    float offset = offset_;
-    if (is_input_)
-        std::fill_n(u.brick(0), u.bricks() * BlockField::brick_size, 0.0f);
-    else
-        now_[0].now->read(bricks.runs, u.brick(0));
-    if (problem_.fields.size() == 2 && !is_input_) {
-        BlockField v(layout.brick_count());
-        now_[1].now->read(bricks.runs, v.brick(0));
-        for (std::size_t i = 0; i < u.bricks() * BlockField::brick_size; ++i) u.brick(0)[i] -= v.brick(0)[i];
+ExactSum BlockedDiffusion::store(const CoordBBox& box, openvdb::FloatTree& part) const {
+    const bool difference = problem_.fields.size() == 2;
+    if (is_input_) {
+        if (difference) {
+            const BlockLayout layout(map_.index().part(box).leaves);
+            const BlockField nothing = zeros(layout.brick_count());
+            stencil::store(layout, nothing.brick(0), 0, part);
+        }
+        return {};
     }
-    if (problem_.fields.size() == 2) offset = 0;
-    stencil::store(layout, u.brick(0), offset, part);
+    BlockedMap::Field u = map_.field_in(box, *now_[0].now);
+    const ExactSum squares = squared_change(u.layout, part, offset_, u.values.brick(0));
+    if (difference) {
+        const BlockedMap::Field v = map_.field_in(box, *now_[1].now);
+        for (std::size_t i = 0; i < u.values.bricks() * BlockField::brick_size; ++i)
+            u.values.brick(0)[i] -= v.values.brick(0)[i];
+    }
+    stencil::store(u.layout, u.values.brick(0), difference ? 0 : offset_, part);
+    return squares;
 }
 
 namespace {
@@ -311,8 +323,7 @@ double noise_of(const MapSource& source, std::uint64_t active) {
     const Coord cell(BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z);
     for (const CoordBBox& own : blocks_of(source.box, cell)) {
         if (!in_noise_sample(own.min(), active)) continue;
-        CoordBBox box = own;
-        box.expand(spacing);
+        const CoordBBox box = grown(own, spacing);
         FloatGrid::Ptr part = source.read(box);
         if (part->tree().hasActiveTiles()) part->tree().voxelizeActiveTiles();
         for (auto leaf = part->tree().cbeginLeaf(); leaf; ++leaf)

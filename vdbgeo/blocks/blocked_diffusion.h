@@ -21,7 +21,7 @@ namespace vdbgeo {
 /// that all steps of a cycle, or some of them, can be taken in it: ghosts lose a rim of q+1 voxels a step.
 /// Between cycles the fields are in temporary files, 4 bytes a voxel each, twice. Memory: `memory`, and 64
 /// bytes for each leaf that is not full.
-class BlockedDiffusion : public CycleSolver {
+class BlockedDiffusion : public CycleSolver, public BlockedResult {
  public:
     /// Goes through the map twice. Errors as DiffusionSolver; NumericalError where the memory is too small.
     BlockedDiffusion(MapSource source, std::vector<DiffusionProblem::Field> fields, const EdgeScale& sigma,
@@ -37,14 +37,13 @@ class BlockedDiffusion : public CycleSolver {
     std::size_t fields() const override { return problem_.fields.size(); }
     void save(StateWriter& writer) override;
     void load(const StateReader& reader) override;
-    void describe(HyperdiffusionReport& report);
-    /// Of X, less its mean.
-    const stencil::FieldSummary& before() const { return before_; }
+    /// All but what was removed.
+    void describe(HyperdiffusionReport& report) const;
+    const stencil::FieldSummary& before() const override { return before_; }
     std::size_t most_blocks() const { return most_blocks_; }
 
-    /// Writes what DiffusionSolver::store writes into the leaves of a part, as the source gives it, that
-    /// begin in `box`.
-    void store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const;
+    /// What DiffusionSolver::store writes. Of two fields the first is u.
+    ExactSum store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const override;
 
  private:
     struct Totals;
@@ -75,8 +74,8 @@ class BlockedDiffusion : public CycleSolver {
     std::size_t most_blocks_ = 0, most_memory_ = 0;
 };
 
-/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. Null where no
-/// voxel is active.
+/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. What was removed is
+/// found when it is stored, and not in the report. Null where no voxel is active.
 std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
                                                       const HyperdiffusionOptions& options,
                                                       const BlockOptions& blocks,

@@ -5,6 +5,7 @@
 
 #include "vdbgeo/core/freed_memory.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/flow/diffusion_fields.h"
 
 namespace vdbgeo {
 
@@ -38,9 +39,7 @@ BlockedFlow::BlockedFlow(MapSource source, const GeometricFlowOptions& options, 
 
 void BlockedFlow::find_first_bound(const Progress& progress) {
     for (std::size_t i = 0; i < plan_.blocks.size(); ++i) {
-        CoordBBox box = plan_.blocks[i];
-        box.expand((rate_of_.reach() + 7) / 8 * 8);
-        const FloatGrid::Ptr grid = map_.read(box);
+        const FloatGrid::Ptr grid = map_.read(grown(plan_.blocks[i], rate_of_.reach()));
         const BlockLayout layout(grid->tree(), plan_.blocks[i]);
         BlockField state(layout.brick_count()), rate(layout.brick_count());
         stencil::load(layout, grid->tree(), 0, state.brick(0));
@@ -50,8 +49,7 @@ void BlockedFlow::find_first_bound(const Progress& progress) {
 }
 
 void BlockedFlow::take_block(const CoordBBox& own, float dt, stencil::FieldTotal& total, double& row_sum) {
-    CoordBBox box = own;
-    box.expand(plan_.halo);
+    const CoordBBox box = grown(own, plan_.halo);
     const BrickIndex::Part bricks = map_.index().part(box);
     BlockLayout layout(bricks.leaves, own);
     BlockField state(layout.brick_count()), rate(layout.brick_count()), input;
@@ -67,7 +65,7 @@ void BlockedFlow::take_block(const CoordBBox& own, float dt, stencil::FieldTotal
     if (!state_.now || options_.fidelity != 0) give_memory_back();  // what the grids took
     clear(rate);
     memory_ = std::max(memory_, layout.memory() + state.memory() + rate.memory());
-    layout.work_on(cells_within(own, rate_of_.reach()));
+    layout.work_on(grown(own, rate_of_.reach()));
     const float* const x = input.empty() ? nullptr : input.brick(0);
     rate_of_(layout, state.brick(0), x, rate.brick(0));
     float* s = state.brick(0);
@@ -90,15 +88,12 @@ stencil::FieldSummary BlockedFlow::take(double dt) {
     return total.summary();
 }
 
-double BlockedFlow::removed() const { return state_.now ? map_.removed(*state_.now, 0, before_.count) : 0; }
-
-void BlockedFlow::store(const CoordBBox& box, openvdb::FloatTree& part) const {
-    if (!state_.now) return;
-    const BrickIndex::Part bricks = map_.index().part(box);
-    const BlockLayout layout(bricks.leaves);
-    BlockField s(layout.brick_count());
-    state_.now->read(bricks.runs, s.brick(0));
-    stencil::store(layout, s.brick(0), 0, part);
+ExactSum BlockedFlow::store(const CoordBBox& box, openvdb::FloatTree& part) const {
+    if (!state_.now) return {};
+    const BlockedMap::Field s = map_.field_in(box, *state_.now);
+    const ExactSum squares = squared_change(s.layout, part, 0, s.values.brick(0));
+    stencil::store(s.layout, s.values.brick(0), 0, part);
+    return squares;
 }
 
 std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source,
@@ -110,7 +105,6 @@ std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source,
     if (flow->before().count == 0) return nullptr;
     report.active_voxels = flow->before().count;
     take_flow_steps(*flow, flow->before(), options, report, progress.part(0.1, 1));
-    report.removed = flow->removed();
     report.state_bytes = flow->memory();
     report.blocks = flow->blocks();
     return flow;

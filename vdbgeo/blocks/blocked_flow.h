@@ -12,7 +12,7 @@ namespace vdbgeo {
 /// geometric_flow's values, to the bit, whatever the blocks. The bound of a step is that of the whole map, so
 /// one step is taken at a time: a pass over the map, in which each block takes it with ghosts of 2 (q+1)
 /// voxels and finds the bound of the next. Between steps S is in temporary files.
-class BlockedFlow : public FlowSteps {
+class BlockedFlow : public FlowSteps, public BlockedResult {
  public:
     /// Goes through the map twice. Errors as geometric_flow; NumericalError where the memory is too small.
     BlockedFlow(MapSource source, const GeometricFlowOptions& options, const BlockOptions& blocks,
@@ -21,12 +21,10 @@ class BlockedFlow : public FlowSteps {
     double bound() override { return rate_of_.bound(row_sum_); }
     stencil::FieldSummary take(double dt) override;
 
-    const stencil::FieldSummary& before() const { return before_; }
-    double removed() const;
+    const stencil::FieldSummary& before() const override { return before_; }
     std::size_t blocks() const { return plan_.blocks.size(); }
     std::size_t memory() const { return memory_ + map_.index().memory(); }
-    /// Writes what there is now into the leaves of a part, as the source gives it, that begin in `box`.
-    void store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const;
+    ExactSum store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const override;
 
  private:
     void take_block(const openvdb::CoordBBox& own, float dt, stencil::FieldTotal& total, double& row_sum);
@@ -42,7 +40,8 @@ class BlockedFlow : public FlowSteps {
     std::size_t memory_ = 0;
 };
 
-/// geometric_flow of such a map; what it made is then in the result. Null where no voxel is active.
+/// geometric_flow of such a map; what it made is then in the result. What was removed is found when it is
+/// stored, and not in the report. Null where no voxel is active.
 std::unique_ptr<BlockedFlow> geometric_flow_blocks(const MapSource& source,
                                                    const GeometricFlowOptions& options,
                                                    const BlockOptions& blocks, HyperdiffusionReport& report,

@@ -1,11 +1,8 @@
 #include "vdbgeo/blocks/blocked_map.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "vdbgeo/flow/diffusion_fields.h"
 #include "vdbgeo/flow/diffusion_solver.h"
-#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo {
 
@@ -25,10 +22,9 @@ BrickFile& next_of(BrickGenerations& field, const std::filesystem::path& scratch
     return *field.next;
 }
 
-CoordBBox cells_within(const CoordBBox& own, int reach) {
-    CoordBBox box = own;
-    box.expand(reach);
-    return cells_of(box);
+CoordBBox grown(CoordBBox box, int by) {
+    box.expand(by);
+    return box;
 }
 
 FloatGrid::Ptr BlockedMap::read(const CoordBBox& box) const {
@@ -73,20 +69,11 @@ stencil::FieldSummary BlockedMap::survey(const Progress& progress) {
     return given;
 }
 
-double BlockedMap::removed(const BrickFile& u, float offset, std::uint64_t active) const {
-    stencil::CellTotal<double> total(0.0, [](double& sum, const double& more) { sum += more; });
-    for (const CoordBBox& own : reading_plan(0).blocks) {
-        const FloatGrid::Ptr x = read(own);
-        const BrickIndex::Part bricks = index_.part(own);
-        const BlockLayout layout(bricks.leaves, own);
-        BlockField now(layout.brick_count());
-        u.read(bricks.runs, now.brick(0));
-        total.add(layout, stencil::sum_by_cell(layout, 0.0, [&](std::size_t b, double& sum) {
-                      const float* of_x = x->tree().probeConstLeaf(layout.origin(b))->buffer().data();
-                      add_removed(of_x, offset, now.brick(b), layout.mask(b), sum);
-                  }));
-    }
-    return std::sqrt(total.total() / std::max(1.0, static_cast<double>(active)));
+BlockedMap::Field BlockedMap::field_in(const CoordBBox& box, const BrickFile& file) const {
+    const BrickIndex::Part bricks = index_.part(box);
+    Field field{BlockLayout(bricks.leaves), BlockField(bricks.leaves.size())};
+    file.read(bricks.runs, field.values.brick(0));
+    return field;
 }
 
 }  // namespace vdbgeo

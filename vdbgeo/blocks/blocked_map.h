@@ -34,6 +34,17 @@ struct BlockOptions {
     CheckpointOptions checkpoint;
 };
 
+/// What was made of such a map, in files.
+class BlockedResult {
+ public:
+    virtual ~BlockedResult() = default;
+    /// Of the map's values, less some number.
+    virtual const stencil::FieldSummary& before() const = 0;
+    /// Writes the new values into the leaves of a part, as the source gives it, that begin in `box`. Returns
+    /// Σ (X − u)² over their active voxels.
+    virtual ExactSum store(const openvdb::CoordBBox& box, openvdb::FloatTree& part) const = 0;
+};
+
 /// What those share who go through such a map.
 class BlockedMap {
  public:
@@ -53,8 +64,12 @@ class BlockedMap {
     BlockPlan plan(const BlockWork& work) const;
     /// Blocks in which X is read, and this many fields are in memory.
     BlockPlan reading_plan(int ghosts, int fields = 1) const;
-    /// The root mean square of X − offset − u over the active voxels, of which there are so many.
-    double removed(const BrickFile& u, float offset, std::uint64_t active) const;
+    /// The bricks of a field whose leaves begin in a box.
+    struct Field {
+        stencil::BlockLayout layout;
+        stencil::BlockField values;
+    };
+    Field field_in(const openvdb::CoordBBox& box, const BrickFile& file) const;
 
  private:
     MapSource source_;
@@ -71,7 +86,7 @@ struct BrickGenerations {
 /// What next values are written to; made where it is not there.
 BrickFile& next_of(BrickGenerations& field, const std::filesystem::path& scratch);
 
-/// Box of the cells that have to be computed so that values within `reach` of `own` come out right.
-openvdb::CoordBBox cells_within(const openvdb::CoordBBox& own, int reach);
+/// The box and so many voxels around it.
+openvdb::CoordBBox grown(openvdb::CoordBBox box, int by);
 
 }  // namespace vdbgeo

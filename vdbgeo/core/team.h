@@ -28,18 +28,26 @@ class Team {
     /// Adds up, number by number, what all gave; all give equally many.
     virtual void add_up(std::vector<std::uint64_t>& numbers) = 0;
 
-    /// Sends floats and returns at once. Messages of one tag from one member to another arrive in their
-    /// order.
-    virtual void send(int to, int tag, std::vector<float> data) = 0;
-
-    /// A message that is to come. It can begin to come as soon as it is expected.
+    /// Messages of floats from one member to another arrive in their order, where they have one tag. Who
+    /// sends has the one end, who receives the other, for as many messages as they like.
+    class Outgoing {
+     public:
+        virtual ~Outgoing() = default;
+        /// Where to put the next message, of so many floats; waits until the last one has left.
+        virtual float* buffer(std::size_t count) = 0;
+        /// Sends what was put there, and returns at once.
+        virtual void send() = 0;
+    };
     class Incoming {
      public:
         virtual ~Incoming() = default;
-        /// Waits for it; once.
-        virtual std::vector<float> take() = 0;
+        /// A message of so many floats is to come: it can begin to from now on.
+        virtual void expect(std::size_t count) = 0;
+        /// Waits for the one that was expected, which is there until the next is expected.
+        virtual const float* take() = 0;
     };
-    virtual std::unique_ptr<Incoming> expect(int from, int tag, std::size_t count) = 0;
+    virtual std::unique_ptr<Outgoing> outgoing(int to, int tag) = 0;
+    virtual std::unique_ptr<Incoming> incoming(int from, int tag) = 0;
 
     /// Lets messages move that are on their way: called now and then by who computes.
     virtual void move_messages() {}

@@ -9,6 +9,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/flow/cycles.h"
+#include "vdbgeo/stencil/brick_sums.h"
 #include "vdbgeo/stencil/diffusivity.h"
 #include "vdbgeo/stencil/line_solve.h"
 
@@ -238,13 +239,24 @@ std::size_t DiffusionFields::bytes_a_brick(const DiffusionProblem& problem) {
     return fields * brick + table;
 }
 
-void add_removed(const float* x, float offset, const float* u, const BlockLayout::Mask& mask, double& sum) {
-    for (std::size_t w = 0; w < 8; ++w)
-        for (std::uint64_t word = mask[w]; word; word &= word - 1) {
-            const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
-            const double d = static_cast<double>(x[i] - offset) - u[i];
-            sum += d * d;
-        }
+ExactSum squared_change(const BlockLayout& layout, const openvdb::FloatTree& x, float offset,
+                        const float* u) {
+    return stencil::sum_of_bricks<ExactSum>(layout, [&](std::size_t brick, ExactSum& total) {
+        const float* const of_x = x.probeConstLeaf(layout.origin(brick))->buffer().data();
+        const float* const of_u = u + brick * BlockField::brick_size;
+        double sum = 0;
+        for (std::size_t w = 0; w < 8; ++w)
+            for (std::uint64_t word = layout.mask(brick)[w]; word; word &= word - 1) {
+                const std::size_t i = 64 * w + static_cast<std::size_t>(__builtin_ctzll(word));
+                const double d = static_cast<double>(of_x[i] - offset) - of_u[i];
+                sum += d * d;
+            }
+        total.add(sum);
+    });
+}
+
+double root_mean_square(const ExactSum& sum, std::uint64_t count) {
+    return std::sqrt(sum.value() / std::max(1.0, static_cast<double>(count)));
 }
 
 }  // namespace vdbgeo

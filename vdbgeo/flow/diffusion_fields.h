@@ -105,8 +105,10 @@ class DiffusionFields {
     stencil::BlockField input_;  // X, where it is a target
 };
 
-/// Σ (X − u)² over the active voxels of a brick, added to a sum; u and X less offset.
-void add_removed(const float* x, float offset, const float* u, const stencil::BlockLayout::Mask& mask,
-                 double& sum);
+/// Σ (X − offset − u)² over the active voxels of the bricks that a layout works on. The tree has their leaves.
+ExactSum squared_change(const stencil::BlockLayout& layout, const openvdb::FloatTree& x, float offset,
+                        const float* u);
+/// √(sum/count); 0 of nothing.
+double root_mean_square(const ExactSum& sum, std::uint64_t count);
 
 }  // namespace vdbgeo

@@ -94,6 +94,7 @@ void DiffusionSolver::take_sweep(stencil::SweepPlan& plan, const Progress& progr
     ghosts_->begin(written.size());
     plan.before_slab = [&](std::size_t slab) { ghosts_->fill_around(slab, read); };
     plan.after_slab = [&](std::size_t slab) { ghosts_->send(slab, written); };
+    plan.meanwhile = [&] { ghosts_->move(); };
     sweep(layout, plan, progress);
 }
 
@@ -156,14 +157,9 @@ void DiffusionSolver::load(const StateReader& reader) {
 }
 
 double DiffusionSolver::removed() {
-    const BlockLayout& layout = fields_.layout();
-    const float* const now = fields_.now();
-    stencil::CellTotal<double> total(0.0, [](double& sum, const double& more) { sum += more; });
-    total.add(layout, stencil::sum_by_cell(layout, 0.0, [&](std::size_t b, double& sum) {
-                  const float* x = grid_.tree().probeConstLeaf(layout.origin(b))->buffer().data();
-                  add_removed(x, offset_, now + b * stencil::BlockField::brick_size, layout.mask(b), sum);
-              }));
-    return std::sqrt(total.total(team()) / std::max(1.0, static_cast<double>(active_voxels())));
+    ExactSum squares = squared_change(fields_.layout(), grid_.tree(), offset_, fields_.now());
+    if (team()) squares.add_up(*team());
+    return root_mean_square(squares, active_voxels());
 }
 
 }  // namespace vdbgeo

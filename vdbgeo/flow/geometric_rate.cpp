@@ -12,18 +12,17 @@ namespace {
 using stencil::BlockLayout;
 using stencil::Tile;
 
-constexpr int sizes[3] = {BlockLayout::size_x, BlockLayout::size_y, BlockLayout::size_z};
-
-/// body(at, n) for the rows of the cell, grown by `before` and `after` voxels along each axis: n voxels from
-/// `at`.
+/// body(at, n) for the rows of what is worked on, grown by `before` and `after` voxels along each axis: n
+/// voxels from `at`.
 template <class Body>
 void for_rows(const Tile& t, const std::array<int, 3>& before, const std::array<int, 3>& after,
               const Body& body) {
-    for (int x = -before[0]; x < sizes[0] + after[0]; ++x)
-        for (int y = -before[1]; y < sizes[1] + after[1]; ++y) {
+    const openvdb::Coord &first = t.work.min(), &last = t.work.max();
+    for (int x = first.x() - before[0]; x <= last.x() + after[0]; ++x)
+        for (int y = first.y() - before[1]; y <= last.y() + after[1]; ++y) {
             const stencil::RowSpan s = t.span(x, y);
-            const int begin = std::max<int>(s.begin, -before[2]),
-                      end = std::min<int>(s.end, sizes[2] + after[2]);
+            const int begin = std::max<int>(s.begin, first.z() - before[2]),
+                      end = std::min<int>(s.end, last.z() + 1 + after[2]);
             if (begin < end) body(t.at(x, y, begin), static_cast<std::ptrdiff_t>(end - begin));
         }
 }
@@ -134,10 +133,11 @@ class RightSide {
         const float normal = root_[a] * per_scale_;
         // A row's span may begin behind the face that the row shares with the one before: faces are 0 there.
         const std::array<int, 3> before = one_axis(static_cast<int>(a));
-        for (int x = -before[0]; x < sizes[0]; ++x)
-            for (int y = -before[1]; y < sizes[1]; ++y) {
+        const openvdb::Coord &first = t.work.min(), &last = t.work.max();
+        for (int x = first.x() - before[0]; x <= last.x(); ++x)
+            for (int y = first.y() - before[1]; y <= last.y(); ++y) {
                 const std::ptrdiff_t row = t.at(x, y, 0);
-                for (std::ptrdiff_t i = row - before[2]; i < row + sizes[2]; ++i) {
+                for (std::ptrdiff_t i = row + first.z() - before[2]; i <= row + last.z(); ++i) {
                     const float both = on[i] * on[i + s];
                     const float d = both * normal * (w[i + s] - w[i]);
                     const float u = both * 0.5f * (p[i] + p[i + s]), v = both * 0.5f * (q[i] + q[i + s]);

@@ -21,11 +21,11 @@ using stencil::Tile;
 std::size_t band_of(const Tile& t, int spacing, float* out) {
     std::size_t n = 0;
     const std::ptrdiff_t dx = spacing * t.stride_x, dy = spacing * t.stride_y, dz = spacing;
-    for (int x = 0; x < BlockLayout::size_x; ++x)
-        for (int y = 0; y < BlockLayout::size_y; ++y) {
+    for (int x = t.work.min().x(); x <= t.work.max().x(); ++x)
+        for (int y = t.work.min().y(); y <= t.work.max().y(); ++y) {
             const float* const u = t.in[0] + t.at(x, y, 0);
             const float* const a = t.active + t.at(x, y, 0);
-            for (int z = 0; z < BlockLayout::size_z; ++z) {
+            for (int z = t.work.min().z(); z <= t.work.max().z(); ++z) {
                 const float neighbors = a[z - dx] + a[z + dx] + a[z - dy] + a[z + dy] + a[z - dz] + a[z + dz];
                 const double sum = (static_cast<double>(u[z - dx]) + u[z + dx]) +
                                    (static_cast<double>(u[z - dy]) + u[z + dy]) +

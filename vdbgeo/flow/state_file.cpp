@@ -77,14 +77,10 @@ StateWriter::~StateWriter() {
 }
 
 void StateWriter::add(const BlockLayout& layout, const std::vector<const float*>& fields) {
-    for (const BlockLayout::Cell& cell : layout.cells()) {
-        if (!cell.own) continue;
-        for (const std::int32_t brick : cell.bricks) {
-            if (brick == BlockLayout::none) continue;
-            const auto b = static_cast<std::size_t>(brick);
-            file_->origins.push_back(layout.origin(b));
-            for (const float* field : fields) file_->put(field + b * BlockField::brick_size, brick_bytes);
-        }
+    for (std::size_t b = 0; b < layout.brick_count(); ++b) {
+        if (!layout.works_on(b)) continue;
+        file_->origins.push_back(layout.origin(b));
+        for (const float* field : fields) file_->put(field + b * BlockField::brick_size, brick_bytes);
     }
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <new>
@@ -13,6 +12,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/file_hash.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/brick_sums.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo::stencil {
@@ -99,51 +99,86 @@ double FieldSummary::variance() const {
     return std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m);
 }
 
-namespace {
-
-FieldSummary nothing_yet() {
-    FieldSummary s;
-    s.min = std::numeric_limits<float>::infinity();
-    s.max = -s.min;
-    return s;
+void FieldTotal::add_brick(const BlockLayout::Mask& mask, const float* values) {
+    // Side by side, in a fixed order. What is not finite shows in the squares.
+    constexpr std::size_t wide = 16;
+    double sums[wide] = {}, squares[wide] = {};
+    float low[wide], high[wide];
+    std::fill_n(low, wide, min_);
+    std::fill_n(high, wide, max_);
+    const bool full = std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return ~word == 0; });
+    if (full) {
+        for (std::size_t i = 0; i < BlockField::brick_size; i += wide)
+            for (std::size_t k = 0; k < wide; ++k) {
+                const float value = values[i + k];
+                sums[k] += value;
+                squares[k] += static_cast<double>(value) * value;
+                low[k] = value < low[k] ? value : low[k];
+                high[k] = value > high[k] ? value : high[k];
+            }
+    }
+    double sum = 0, square = 0;
+    for (std::size_t k = 0; k < wide; ++k) {
+        sum += sums[k];
+        square += squares[k];
+    }
+    if (!full || !std::isfinite(square)) return add_sparse_brick(mask, values);
+    count_ += BlockField::brick_size;
+    min_ = *std::min_element(low, low + wide);
+    max_ = *std::max_element(high, high + wide);
+    sum_.add(sum);
+    squares_.add(square);
 }
 
-void join_summaries(FieldSummary& a, const FieldSummary& b) {
-    a.sum += b.sum;
-    a.sum_of_squares += b.sum_of_squares;
-    a.min = std::min(a.min, b.min);
-    a.max = std::max(a.max, b.max);
-    a.count += b.count;
-    a.non_finite += b.non_finite;
+void FieldTotal::add_sparse_brick(const BlockLayout::Mask& mask, const float* values) {
+    double sum = 0, squares = 0;
+    for (std::size_t x = 0; x < 8; ++x)
+        for (std::uint64_t word = mask[x]; word; word &= word - 1) {
+            const float value = values[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
+            if (!std::isfinite(value)) {
+                ++non_finite_;
+                continue;
+            }
+            ++count_;
+            sum += value;
+            squares += static_cast<double>(value) * value;
+            min_ = std::min(min_, value);
+            max_ = std::max(max_, value);
+        }
+    sum_.add(sum);
+    squares_.add(squares);
 }
-
-}  // namespace
-
-FieldTotal::FieldTotal() : total_(nothing_yet(), join_summaries) {}
 
 void FieldTotal::add(const BlockLayout& layout, const float* bricks) {
-    total_.add(layout, sum_by_cell(layout, nothing_yet(), [&](std::size_t i, FieldSummary& s) {
-                   const float* v = bricks + i * BlockField::brick_size;
-                   for (std::size_t x = 0; x < 8; ++x)
-                       for (std::uint64_t word = layout.mask(i)[x]; word; word &= word - 1) {
-                           const float value = v[64 * x + static_cast<std::size_t>(__builtin_ctzll(word))];
-                           if (!std::isfinite(value)) {
-                               ++s.non_finite;
-                               continue;
-                           }
-                           ++s.count;
-                           s.sum += value;
-                           s.sum_of_squares += static_cast<double>(value) * value;
-                           s.min = std::min(s.min, value);
-                           s.max = std::max(s.max, value);
-                       }
-               }));
+    add(sum_of_bricks<FieldTotal>(layout, [&](std::size_t i, FieldTotal& total) {
+        total.add_brick(layout.mask(i), bricks + i * BlockField::brick_size);
+    }));
+}
+
+void FieldTotal::add(const FieldTotal& other) {
+    sum_.add(other.sum_);
+    squares_.add(other.squares_);
+    min_ = std::min(min_, other.min_);
+    max_ = std::max(max_, other.max_);
+    count_ += other.count_;
+    non_finite_ += other.non_finite_;
 }
 
 FieldSummary FieldTotal::summary(Team* team) const {
-    FieldSummary total = total_.total(team);
-    if (total.count == 0) total.min = total.max = 0;
-    return total;
+    FieldTotal all = *this;
+    if (team) {
+        all.sum_.add_up(*team);
+        all.squares_.add_up(*team);
+        for (const float value : gather_all<float>(*team, {min_})) all.min_ = std::min(all.min_, value);
+        for (const float value : gather_all<float>(*team, {max_})) all.max_ = std::max(all.max_, value);
+        std::vector<std::uint64_t> counts{count_, non_finite_};
+        team->add_up(counts);
+        all.count_ = counts[0];
+        all.non_finite_ = counts[1];
+    }
+    FieldSummary s{all.sum_.value(), all.squares_.value(), all.min_, all.max_, all.count_, all.non_finite_};
+    if (s.count == 0) s.min = s.max = 0;
+    return s;
 }
 
 FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team) {
@@ -153,28 +188,32 @@ FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* tea
 }
 
 std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks) {
-    const auto of_cell = sum_by_cell(layout, std::uint64_t(0), [&](std::size_t brick, std::uint64_t& sum) {
-        const openvdb::Coord& at = layout.origin(brick);
-        const std::uint64_t place = hash_of(&at, sizeof at, 0);
-        sum += hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
-                       hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
-    });
-    std::uint64_t sum = 0;
-    for (const std::uint64_t value : of_cell) sum += value;
-    return sum;
+    struct Sum {
+        std::uint64_t value = 0;
+        void add(const Sum& other) { value += other.value; }
+    };
+    return sum_of_bricks<Sum>(layout, [&](std::size_t brick, Sum& sum) {
+               const openvdb::Coord& at = layout.origin(brick);
+               const std::uint64_t place = hash_of(&at, sizeof at, 0);
+               sum.value +=
+                   hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
+                           hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
+           })
+        .value;
 }
 
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team) {
-    const auto part = [&](std::size_t brick, double& sum) {
+    ExactSum total = sum_of_bricks<ExactSum>(layout, [&](std::size_t brick, ExactSum& sum) {
+        double of_brick = 0;
         // Inactive voxels are 0 in every field.
         for (std::size_t i = brick * BlockField::brick_size; i < (brick + 1) * BlockField::brick_size; ++i) {
             const double d = static_cast<double>(a[i]) - b[i];
-            sum += d * d;
+            of_brick += d * d;
         }
-    };
-    CellTotal<double> total(0.0, [](double& sum, const double& more) { sum += more; });
-    total.add(layout, sum_by_cell(layout, 0.0, part));
-    return total.total(team);
+        sum.add(of_brick);
+    });
+    if (team) total.add_up(*team);
+    return total.value();
 }
 
 void load(const BlockLayout& layout, const openvdb::FloatTree& tree, float offset, float* out) {

@@ -4,11 +4,12 @@
 #include <openvdb/openvdb.h>
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 
+#include "vdbgeo/core/exact_sum.h"
 #include "vdbgeo/core/team.h"
 #include "vdbgeo/stencil/block_layout.h"
-#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo::stencil {
 
@@ -49,7 +50,7 @@ class BlockField {
     std::size_t bricks_ = 0;
 };
 
-/// What a field holds in its active voxels. Sums are in double and in a fixed order.
+/// What a field holds in its active voxels. Sums are exact but for those of a brick, which are in double.
 struct FieldSummary {
     double sum = 0, sum_of_squares = 0;
     float min = 0, max = 0;  ///< 0 without voxels; of the finite values
@@ -59,26 +60,31 @@ struct FieldSummary {
     double variance() const;
 };
 
-/// A field as it is in memory: brick i of the layout at `bricks` + 512 i. Over the own cells, of all members
-/// where there is a team; the same bits however the cells are shared out.
+/// A field as it is in memory: brick i of the layout at `bricks` + 512 i. Over the bricks that the layout
+/// works on, of all members where there is a team; the same bits however they are shared out.
 FieldSummary summarize(const BlockLayout& layout, const float* bricks, Team* team = nullptr);
 
-/// The same of a field that comes in parts: CellTotal tells in which order.
+/// The same of a field that comes in parts, in any order.
 class FieldTotal {
  public:
-    FieldTotal();
     void add(const BlockLayout& layout, const float* bricks);
+    void add(const FieldTotal& other);
     FieldSummary summary(Team* team = nullptr) const;
 
  private:
-    CellTotal<FieldSummary> total_;
+    void add_brick(const BlockLayout::Mask& mask, const float* values);
+    void add_sparse_brick(const BlockLayout::Mask& mask, const float* values);
+
+    ExactSum sum_, squares_;
+    float min_ = std::numeric_limits<float>::infinity(), max_ = -std::numeric_limits<float>::infinity();
+    std::uint64_t count_ = 0, non_finite_ = 0;
 };
 
-/// A number that tells this field, and where it lies, from others: of the own cells, to be added up over the
-/// parts of a grid (it wraps around).
+/// A number that tells this field, and where it lies, from others: of the bricks that the layout works on, to
+/// be added up over the parts of a grid (it wraps around).
 std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks);
 
-/// Σ (a − b)² over the active voxels, in the same order.
+/// Σ (a − b)² over the active voxels that the layout works on.
 double squared_distance(const BlockLayout& layout, const float* a, const float* b, Team* team = nullptr);
 
 /// out = value − offset in the active voxels, 0 in the others. The tree has the layout's leaves.

@@ -8,6 +8,7 @@
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
+#include "vdbgeo/stencil/brick_sums.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo::stencil {
@@ -79,36 +80,36 @@ void BlockLayout::take(std::size_t leaves, const std::optional<CoordBBox>& own, 
         masks_[i] = leaf.mask;
         full_[i] = std::all_of(leaf.mask.begin(), leaf.mask.end(), [](std::uint64_t w) { return ~w == 0; });
     });
-    make_cells(own);
+    make_cells();
     make_neighbors();
-    count_active();
+    if (own) work_on(*own);
 }
 
-void BlockLayout::work_on(const CoordBBox& own) {
-    for (Cell& cell : cells_) cell.own = own.isInside(cell.origin);
-    count_active();
+void BlockLayout::work_on(const CoordBBox& box) {
+    work_ = box;
+    for (Cell& cell : cells_) cell.own = !work_in(cell).empty();
 }
 
-void BlockLayout::count_active() {
-    active_ = 0;
-    for (const Cell& cell : cells_) {
-        if (!cell.own) continue;
-        for (const std::int32_t b : cell.bricks) {
-            if (b == none) continue;
-            for (const std::uint64_t word : masks_[static_cast<std::size_t>(b)])
-                active_ += static_cast<std::uint64_t>(__builtin_popcountll(word));
-        }
-    }
+std::uint64_t BlockLayout::active_count() const {
+    struct Count {
+        std::uint64_t voxels = 0;
+        void add(const Count& other) { voxels += other.voxels; }
+    };
+    return sum_of_bricks<Count>(*this, [&](std::size_t brick, Count& count) {
+               for (const std::uint64_t word : masks_[brick])
+                   count.voxels += static_cast<std::uint64_t>(__builtin_popcountll(word));
+           })
+        .voxels;
 }
 
-void BlockLayout::make_cells(const std::optional<CoordBBox>& own) {
+void BlockLayout::make_cells() {
     for (std::size_t i = 0; i < origins_.size(); ++i) {
         const Coord c = cell_of(origins_[i]);
         const Coord first(c.x() * size_x, c.y() * size_y, c.z() * size_z);
         if (cells_.empty() || cells_.back().origin != first) {
             if (cells_.empty() || cells_.back().origin.y() != first.y())
                 slabs_.push_back({i, i, cells_.size(), cells_.size()});
-            cells_.push_back({first, {}, {}, !own || own->isInside(first)});
+            cells_.push_back({first, {}, {}, true});
             cells_.back().bricks.fill(none);
             ++slabs_.back().last_cell;
         }

@@ -34,7 +34,7 @@ class BlockLayout {
         std::array<std::int32_t, leaves_x * leaves_y * leaves_z> bricks;
         /// Cell at offset (dx, dy, dz), each −1…1, at ((dx+1) · 3 + dy+1) · 3 + dz+1, or none.
         std::array<std::int32_t, 27> neighbors;
-        bool own = true;  ///< operators work on it; other cells only are there for their neighbours
+        bool own = true;  ///< operators work on some of it; others only are there for their neighbours
     };
     /// Bricks [begin, end) and cells [first_cell, last_cell) of one y.
     struct Slab {
@@ -48,7 +48,7 @@ class BlockLayout {
     BlockLayout() = default;
     /// Throws InvalidInput where the tree has active tiles (voxelizeActiveTiles makes leaves of them), or
     /// more than 2^31 leaves. Cost: about 0.3 µs a leaf; 70 to 80 bytes a leaf, 12 for each in a full cell.
-    /// `own`: the box of the cells to work on, at multiples of their size; unset: all.
+    /// `own`: what to work on, as work_on; unset: all.
     explicit BlockLayout(const openvdb::FloatTree& tree, const std::optional<openvdb::CoordBBox>& own = {});
 
     /// The same of leaves that are listed: their first voxels, in any order, and their masks. Those whose
@@ -58,18 +58,26 @@ class BlockLayout {
         Mask mask;
     };
     explicit BlockLayout(std::vector<LeafMask> leaves, const std::optional<openvdb::CoordBBox>& own = {});
-    /// From now on operators work on the cells that begin in this box.
-    void work_on(const openvdb::CoordBBox& own);
+    /// From now on operators work on the voxels in this box; what they leave in the rest of the leaves that it
+    /// cuts is not told. Sums are over the leaves that begin in it.
+    void work_on(const openvdb::CoordBBox& box);
+    bool works_on(std::size_t brick) const { return work_.isInside(origins_[brick]); }
+    /// What of a cell is worked on.
+    openvdb::CoordBBox work_in(const Cell& cell) const {
+        openvdb::CoordBBox box(cell.origin, cell.origin.offsetBy(size_x - 1, size_y - 1, size_z - 1));
+        box.intersect(work_);
+        return box;
+    }
 
     std::size_t brick_count() const { return origins_.size(); }
-    /// Active voxels of the own cells.
-    std::uint64_t active_count() const { return active_; }
+    /// Active voxels of the leaves that are worked on: counts them.
+    std::uint64_t active_count() const;
     const openvdb::Coord& origin(std::size_t brick) const { return origins_[brick]; }
     const Mask& mask(std::size_t brick) const { return masks_[brick]; }
     bool full(std::size_t brick) const { return full_[brick] != 0; }
     const std::vector<Cell>& cells() const { return cells_; }
     const std::vector<Slab>& slabs() const { return slabs_; }
-    /// The runs of a slab's own cells, at most `length` cells long, starting at multiples of it where cells
+    /// The runs of a slab's own cells: at most `length` cells long, starting at multiples of it where cells
     /// are complete.
     std::vector<Run> runs(const Slab& slab, int length) const;
     /// Cell of the cell's neighbourhood; null where there is none.
@@ -83,8 +91,7 @@ class BlockLayout {
  private:
     template <class LeafAt>
     void take(std::size_t leaves, const std::optional<openvdb::CoordBBox>& own, const LeafAt& leaf_at);
-    void make_cells(const std::optional<openvdb::CoordBBox>& own);
-    void count_active();
+    void make_cells();
     void make_neighbors();
 
     std::vector<openvdb::Coord> origins_;
@@ -92,7 +99,7 @@ class BlockLayout {
     std::vector<std::uint8_t> full_;
     std::vector<Cell> cells_;
     std::vector<Slab> slabs_;
-    std::uint64_t active_ = 0;
+    openvdb::CoordBBox work_ = openvdb::CoordBBox::inf();
 };
 
 }  // namespace vdbgeo::stencil

@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <thread>
 
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
@@ -46,6 +47,7 @@ struct Scratch {
     std::vector<Field> fields;
     std::vector<PlaneRing> activity;  // one where a term has no diffusivity
     std::vector<RowSpan> spans;       // ring of planes
+    int first_row = 0, last_row = 0;  // rows [first, last) are there, with their halo
 };
 
 class Sweep {
@@ -68,7 +70,7 @@ class Sweep {
     void step(int k, int x, int margin, std::size_t field, Scratch& s) const;
     void scatter(TileGather& tile, int x, Scratch& s) const;
     PlaneRange range(int x, int margin, Scratch& s) const {
-        return {margin, rows_ - margin, stride_, spans(x, s), spans(x - 1, s), spans(x + 1, s)};
+        return {s.first_row + margin, s.last_row - margin, stride_, spans(x, s), spans(x - 1, s), spans(x + 1, s)};
     }
     RowSpan* spans(int x, Scratch& s) const {
         return s.spans.data() + ((x % planes_ + planes_) % planes_) * rows_;
@@ -189,6 +191,8 @@ void Sweep::scatter(TileGather& tile, int x, Scratch& s) const {
 void Sweep::run(BlockLayout::Run cells, Scratch& s) const {
     TileGather in(layout_, cells, halo_), out(layout_, cells, halo_);
     const int first = in.x_begin() - halo_;
+    s.first_row = in.y_begin();
+    s.last_row = in.y_end() + 2 * halo_;
     for (int x = first; x < in.x_end() + halo_; ++x) {
         in.move_to(x);
         gather(in, x, s);
@@ -233,11 +237,15 @@ void sweep(const BlockLayout& layout, SweepPlan& plan, const Progress& progress)
     tbb::enumerable_thread_specific<Scratch> scratch([&] { return work.make_scratch(); });
     const auto& slabs = layout.slabs();
     const bool forward = plan.fields.front().state->forward();
+    const std::thread::id caller = std::this_thread::get_id();
     for (std::size_t i = 0; i < slabs.size(); ++i) {
         const std::size_t at = forward ? i : slabs.size() - 1 - i;
         const std::vector<BlockLayout::Run> runs = layout.runs(slabs[at], run_length);
         if (plan.before_slab) plan.before_slab(at);
-        parallel_for(runs.size(), 1, [&](std::size_t r) { work.run(runs[r], scratch.local()); });
+        parallel_for(runs.size(), 1, [&](std::size_t r) {
+            work.run(runs[r], scratch.local());
+            if (plan.meanwhile && std::this_thread::get_id() == caller) plan.meanwhile();
+        });
         if (plan.after_slab) plan.after_slab(at);
         progress.report(static_cast<double>(i + 1) / static_cast<double>(slabs.size()));
     }

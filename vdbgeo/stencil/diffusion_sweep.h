@@ -66,6 +66,8 @@ struct SweepPlan {
     /// Called for each slab of the layout before anything of it is read, and once it is written: all slabs
     /// from the first to the last where `state` goes forward, else from the last to the first.
     std::function<void(std::size_t slab)> before_slab, after_slab;
+    /// Called now and then by the thread that sweeps, some milliseconds apart.
+    std::function<void()> meanwhile;
 };
 
 /// The number of steps that fit into one pass for operators up to this order.

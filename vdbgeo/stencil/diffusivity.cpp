@@ -1,5 +1,7 @@
 #include "vdbgeo/stencil/diffusivity.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +26,8 @@ class WindowSums {
           r_(radius),
           width_(2 * radius + 1),
           row_(static_cast<std::size_t>(t.stride_y)),
-          rows_(BlockLayout::size_y),
+          first_(t.work.min().y()),
+          rows_(t.work.dim().y()),
           along_z_(static_cast<std::size_t>(rows_ + 2 * r_) * row_) {
         planes_.resize(static_cast<std::size_t>(quantities));
         for (auto& q : planes_)
@@ -35,10 +38,10 @@ class WindowSums {
     /// Adds plane x of an array that starts a row at z = −lead.
     void add_plane(int quantity, int x, const float* rows, bool squared) {
         const Kernels& k = kernels();
-        for (int y = -r_; y < rows_ + r_; ++y)
+        for (int y = first_ - r_; y < first_ + rows_ + r_; ++y)
             k.window_sum(row_, r_, rows + y * tile_.stride_y, squared, z_row(y));
         const double* in[2 * 8 + 1];
-        for (int y = 0; y < rows_; ++y) {
+        for (int y = first_; y < first_ + rows_; ++y) {
             for (int j = 0; j < width_; ++j) in[j] = z_row(y - r_ + j);
             k.sum_rows(row_, width_, in, plane_row(quantity, x, y));
         }
@@ -53,17 +56,17 @@ class WindowSums {
     }
 
  private:
-    double* z_row(int y) { return along_z_.data() + static_cast<std::size_t>(y + r_) * row_; }
+    double* z_row(int y) { return along_z_.data() + static_cast<std::size_t>(y - first_ + r_) * row_; }
     double* plane_row(int quantity, int x, int y) {
         const int slot = (x + width_) % width_;
         return planes_[static_cast<std::size_t>(quantity)].data() +
-               static_cast<std::size_t>(slot * rows_ + y) * row_;
+               static_cast<std::size_t>(slot * rows_ + y - first_) * row_;
     }
 
     const Tile& tile_;
     int r_, width_;
     std::size_t row_;
-    int rows_;
+    int first_, rows_;
     std::vector<double> along_z_;
     std::vector<std::vector<double>> planes_, sums_;
 };
@@ -79,10 +82,10 @@ class TileDiffusivity {
         const int r = o_.radius;
         WindowSums sums(t_, std::max(r, 1), components + 2);
         std::vector<float> variance(row_, static_cast<float>(std::max(o_.sigma_squared, o_.floor)));
-        for (int x = -r; x < BlockLayout::size_x + r; ++x) {
+        for (int x = t_.work.min().x() - r; x <= t_.work.max().x() + r; ++x) {
             gradient(x, components == 3);
             if (components) add(sums, x, components);
-            if (const int done = x - r; done >= 0) finish(sums, done, components, variance);
+            if (const int done = x - r; done >= t_.work.min().x()) finish(sums, done, components, variance);
         }
     }
 
@@ -95,9 +98,10 @@ class TileDiffusivity {
         const float* u = plane(t_.in[0], x);
         const float* a = plane(t_.active, x);
         const Planes pu{u - t_.stride_x, u, u + t_.stride_x}, pa{a - t_.stride_x, a, a + t_.stride_x};
+        const int first = t_.work.min().y() - margin, last = t_.work.max().y() + margin;
         const std::vector<RowSpan> all(static_cast<std::size_t>(BlockLayout::size_y + 2 * margin),
                                        {0, static_cast<std::int16_t>(t_.stride_y)});
-        const PlaneRange range{-margin, BlockLayout::size_y + margin, t_.stride_y, all.data() + margin};
+        const PlaneRange range{first, last + 1, t_.stride_y, all.data() + margin};
         float* g[3];
         for (int c = 0; c < 3; ++c) g[c] = plane(t_.scratch[static_cast<std::size_t>(c)], x);
         kernels().gradient(range, pu, pa, scale_.data(), components ? g : nullptr, plane(t_.scratch[3], x));
@@ -114,7 +118,7 @@ class TileDiffusivity {
             sums.add_plane(2 + c, x, plane(t_.scratch[static_cast<std::size_t>(c)], x), false);
     }
     void finish(WindowSums& sums, int x, int components, std::vector<float>& variance) const {
-        for (int y = 0; y < BlockLayout::size_y; ++y) {
+        for (int y = t_.work.min().y(); y <= t_.work.max().y(); ++y) {
             if (components) {
                 const double* means[3] = {};
                 for (int c = 0; c < components; ++c) means[c] = sums.row(2 + c, x, y);
@@ -148,51 +152,75 @@ void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights
     for_each_tile(layout, fields, [&](Tile& t) { TileDiffusivity(t, options, scale).run(); });
 }
 
-GradientTotal::GradientTotal(const Vec3d& weights) : weights_(weights), total_(Sums(), join) {}
+namespace {
 
-void GradientTotal::join(Sums& a, const Sums& b) {
-    a.square += b.square;
-    for (int c = 0; c < 3; ++c) a.component[c] += b.component[c];
-}
+/// A sum in as many parts as a vector has numbers, so that they add up side by side.
+struct RowSum {
+    double part[lanes] = {};
+    void add(const float* row, int n) {
+        for (int i = 0; i < n; i += lanes)
+            for (int k = 0; k < lanes; ++k) part[k] += static_cast<double>(row[i + k]);
+    }
+    double value() const {
+        double sum = 0;
+        for (const double p : part) sum += p;
+        return sum;
+    }
+};
 
-void GradientTotal::add(const BlockLayout& layout, const float* u) {
-    std::vector<Sums> of_cell(layout.cells().size());
-    const std::array<float, 3> scale = roots(weights_);
-    TileFields fields;
-    fields.in = {u};
-    fields.halo = 1;
-    fields.scratch = 4;
-    for_each_tile(layout, fields, [&](Tile& t) {
-        Sums& s = of_cell[t.cell];
-        std::vector<RowSpan> all(BlockLayout::size_y, {0, static_cast<std::int16_t>(t.stride_y)});
+}  // namespace
+
+/// Sums are rounded within the leaves of a cell that have the same y.
+void GradientTotal::add_tile(Tile& t, const float* scale) {
+    constexpr int dim = 8;
+    const std::vector<RowSpan> all(BlockLayout::size_y, {0, static_cast<std::int16_t>(t.stride_y)});
+    for (int begin = t.work.min().y(); begin <= t.work.max().y(); begin += dim) {
+        RowSum square, component[3];
         for (int x = 0; x < BlockLayout::size_x; ++x) {
             const std::ptrdiff_t at = t.at(x, 0, -t.lead);
             const Planes pu{t.in[0] + at - t.stride_x, t.in[0] + at, t.in[0] + at + t.stride_x};
             const Planes pa{t.active + at - t.stride_x, t.active + at, t.active + at + t.stride_x};
             float* g[3] = {t.scratch[0] + at, t.scratch[1] + at, t.scratch[2] + at};
-            kernels().gradient({0, BlockLayout::size_y, t.stride_y, all.data()}, pu, pa, scale.data(), g,
+            kernels().gradient({begin, begin + dim, t.stride_y, all.data()}, pu, pa, scale, g,
                                t.scratch[3] + at);
-            for (int y = 0; y < BlockLayout::size_y; ++y)
-                for (int z = 0; z < BlockLayout::size_z; ++z) {
-                    const std::ptrdiff_t i = t.at(x, y, z);
-                    s.square += static_cast<double>(t.scratch[3][i]);
-                    for (std::size_t c = 0; c < 3; ++c)
-                        s.component[c] += static_cast<double>(t.scratch[c][i]);
-                }
+            for (int y = begin; y < begin + dim; ++y) {
+                square.add(t.scratch[3] + t.at(x, y, 0), BlockLayout::size_z);
+                for (std::size_t c = 0; c < 3; ++c)
+                    component[c].add(t.scratch[c] + t.at(x, y, 0), BlockLayout::size_z);
+            }
         }
-    });
-    total_.add(layout, of_cell);
+        square_.add(square.value());
+        for (std::size_t c = 0; c < 3; ++c) component_[c].add(component[c].value());
+    }
+}
+
+void GradientTotal::add(const BlockLayout& layout, const float* u) {
+    const std::array<float, 3> scale = roots(weights_);
+    TileFields fields;
+    fields.in = {u};
+    fields.halo = 1;
+    fields.scratch = 4;
+    tbb::enumerable_thread_specific<GradientTotal> parts(weights_);
+    for_each_tile(layout, fields, [&](Tile& t) { parts.local().add_tile(t, scale.data()); });
+    for (const GradientTotal& part : parts) {
+        square_.add(part.square_);
+        for (std::size_t c = 0; c < 3; ++c) component_[c].add(part.component_[c]);
+    }
     active_ += layout.active_count();
 }
 
 double GradientTotal::variance(Team* team) const {
-    const Sums total = total_.total(team);
+    GradientTotal all = *this;
     std::vector<std::uint64_t> count{active_};
-    if (team) team->add_up(count);
+    if (team) {
+        all.square_.add_up(*team);
+        for (ExactSum& c : all.component_) c.add_up(*team);
+        team->add_up(count);
+    }
     const double n = std::max(1.0, static_cast<double>(count[0]));
     double means = 0;
-    for (const double c : total.component) means += c / n * (c / n);
-    return std::max(0.0, total.square / n - means);
+    for (const ExactSum& c : all.component_) means += c.value() / n * (c.value() / n);
+    return std::max(0.0, all.square_.value() / n - means);
 }
 
 double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights, Team* team) {

@@ -1,12 +1,16 @@
 // The diffusivity of Eqs 3 and 4: small where the gradient is large.
 #pragma once
 
+#include <array>
+
+#include "vdbgeo/core/exact_sum.h"
 #include "vdbgeo/core/types.h"
 #include "vdbgeo/stencil/block_field.h"
 #include "vdbgeo/stencil/block_layout.h"
-#include "vdbgeo/stencil/cell_sums.h"
 
 namespace vdbgeo::stencil {
+
+struct Tile;
 
 struct Diffusivity {
     double factor = 1;  ///< d_q0
@@ -29,23 +33,21 @@ void diffusivity(const BlockLayout& layout, const float* u, const Vec3d& weights
 double gradient_variance(const BlockLayout& layout, const float* u, const Vec3d& weights,
                          Team* team = nullptr);
 
-/// The same of a field that comes in parts, whose own cells have their neighbours: CellTotal tells in which
-/// order.
+/// The same of a field that comes in parts, in any order, which have their voxels' neighbours. A layout works
+/// on whole cells along x and z here, and on whole leaves along y.
 class GradientTotal {
  public:
-    explicit GradientTotal(const Vec3d& weights);
+    explicit GradientTotal(const Vec3d& weights) : weights_(weights) {}
     void add(const BlockLayout& layout, const float* u);
     double variance(Team* team = nullptr) const;
 
  private:
-    struct Sums {
-        double square = 0, component[3] = {};
-    };
-    static void join(Sums& a, const Sums& b);
+    void add_tile(Tile& t, const float* scale);
 
     Vec3d weights_;
     std::uint64_t active_ = 0;
-    CellTotal<Sums> total_;
+    ExactSum square_;
+    std::array<ExactSum, 3> component_;
 };
 
 }  // namespace vdbgeo::stencil

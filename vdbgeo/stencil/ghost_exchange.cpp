@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "vdbgeo/core/parallel.h"
 #include "vdbgeo/stencil/block_field.h"
 
 namespace vdbgeo::stencil {
@@ -35,6 +36,8 @@ GhostExchange::GhostExchange(const BlockLayout& layout, const Share& share) : te
                 if (r != team_.rank() && reach[static_cast<std::size_t>(r)].hasOverlap(leaf))
                     add(slab.out, r, b);
         }
+        for (Piece& piece : slab.out) piece.out = team_.outgoing(piece.member, slab.tag);
+        for (Piece& piece : slab.in) piece.in = team_.incoming(piece.member, slab.tag);
         slabs_.push_back(std::move(slab));
     }
 }
@@ -43,51 +46,51 @@ GhostExchange::GhostExchange(const BlockLayout& layout, const Share& share) : te
 void GhostExchange::add(std::vector<Piece>& pieces, int member, std::size_t brick) {
     auto piece =
         std::find_if(pieces.begin(), pieces.end(), [&](const Piece& p) { return p.member == member; });
-    if (piece == pieces.end()) piece = pieces.insert(piece, {member, {}});
+    if (piece == pieces.end()) {
+        piece = pieces.emplace(piece);
+        piece->member = member;
+    }
     piece->bricks.push_back(static_cast<std::int32_t>(brick));
 }
 
 void GhostExchange::expect(Slab& slab) {
     slab.round = round_;
-    for (const Piece& piece : slab.in)
-        slab.coming.push_back(
-            team_.expect(piece.member, slab.tag, fields_ * piece.bricks.size() * brick_size));
+    slab.expects = !slab.in.empty();
+    for (const Piece& piece : slab.in) piece.in->expect(fields_ * piece.bricks.size() * brick_size);
 }
 
 void GhostExchange::begin(std::size_t fields) {
     ++round_;
     fields_ = fields;
     for (Slab& slab : slabs_)
-        if (slab.coming.empty()) expect(slab);
+        if (!slab.expects) expect(slab);
 }
 
 void GhostExchange::send(std::size_t slab, const std::vector<const float*>& fields) {
     for (const Piece& piece : slabs_[slab].out) {
-        std::vector<float> data;
-        data.reserve(fields.size() * piece.bricks.size() * brick_size);
-        for (const float* field : fields)
-            for (const std::int32_t b : piece.bricks) {
-                const float* brick = field + static_cast<std::size_t>(b) * brick_size;
-                data.insert(data.end(), brick, brick + brick_size);
-            }
-        bytes_sent_ += data.size() * sizeof(float);
-        team_.send(piece.member, slabs_[slab].tag, std::move(data));
+        const std::size_t count = piece.bricks.size(), values = fields.size() * count * brick_size;
+        float* const to = piece.out->buffer(values);
+        parallel_for(fields.size() * count, 32, [&](std::size_t i) {
+            const auto brick = static_cast<std::size_t>(piece.bricks[i % count]);
+            std::copy_n(fields[i / count] + brick * brick_size, brick_size, to + i * brick_size);
+        });
+        bytes_sent_ += values * sizeof(float);
+        piece.out->send();
     }
-    team_.move_messages();
+    move();
 }
 
 void GhostExchange::fill(Slab& slab, int round, const std::vector<float*>& fields) {
-    if (slab.coming.empty() || slab.round > round) return;
-    for (std::size_t i = 0; i < slab.in.size(); ++i) {
-        const std::vector<float> data = slab.coming[i]->take();
-        const float* from = data.data();
-        for (float* field : fields)
-            for (const std::int32_t b : slab.in[i].bricks) {
-                std::copy_n(from, brick_size, field + static_cast<std::size_t>(b) * brick_size);
-                from += brick_size;
-            }
+    if (!slab.expects || slab.round > round) return;
+    for (const Piece& piece : slab.in) {
+        const float* const from = piece.in->take();
+        const std::size_t count = piece.bricks.size();
+        parallel_for(fields.size() * count, 32, [&](std::size_t i) {
+            const auto brick = static_cast<std::size_t>(piece.bricks[i % count]);
+            std::copy_n(from + i * brick_size, brick_size, fields[i / count] + brick * brick_size);
+        });
     }
-    slab.coming.clear();
+    slab.expects = false;
     if (slab.round < round_) expect(slab);
 }
 

@@ -30,6 +30,8 @@ class GhostExchange {
     void fill_around(std::size_t slab, const std::vector<float*>& fields);
     /// All ghosts that are still to come in the round that has begun.
     void fill_all(const std::vector<float*>& fields);
+    /// Lets messages move on: to be called now and then by the team's thread while others, or it, compute.
+    void move() { team_.move_messages(); }
     /// A whole round at once.
     void run(const std::vector<float*>& fields);
 
@@ -40,11 +42,14 @@ class GhostExchange {
     struct Piece {
         int member = 0;
         std::vector<std::int32_t> bricks;
+        std::unique_ptr<Team::Outgoing> out;
+        std::unique_ptr<Team::Incoming> in;
     };
     struct Slab {
-        int tag = 0, round = 0;  ///< round that `coming` belongs to
+        int tag = 0;
         std::vector<Piece> out, in;
-        std::vector<std::unique_ptr<Team::Incoming>> coming;  ///< by `in`; empty once filled in
+        int round = 0;         ///< the one whose ghosts are to come
+        bool expects = false;  ///< they were not filled in yet
     };
     void add(std::vector<Piece>& pieces, int member, std::size_t brick);
     void expect(Slab& slab);

@@ -10,13 +10,12 @@
 
 namespace vdbgeo::stencil {
 
-/// The cells of a BlockLayout (32 × 32 × 128 voxels) are shared out along y and z: each member has a box of
-/// them, and all along x. Its grid holds the leaves of its own box, and of the others' those that reach into
+/// The leaves of a grid are shared out along y and z: each member has a box of them, and all along x. Its grid holds the leaves of its own box, and of the others' those that reach into
 /// `halo` voxels around it: the ghosts, which the members keep up to date for each other.
 struct Share {
     Team* team = nullptr;
-    /// By rank. In voxels, ends included, at multiples of the cells' size; each cell that holds anything lies
-    /// in one of them.
+    /// By rank. In voxels, ends included, at multiples of 8 along y and of the size of a BlockLayout's cells
+    /// along x and z; each leaf lies in one of them.
     std::vector<openvdb::CoordBBox> boxes;
     int halo = 0;  ///< voxels, a multiple of 8
 

@@ -14,11 +14,12 @@ constexpr int floor_div(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / 
 
 }  // namespace
 
-int TileGather::parts(int leaves, int halo, Part* out) {
+/// Of voxels [begin, end) with a halo; the plane begins `lead` voxels before the cell.
+int TileGather::parts(int begin, int end, int halo, int lead, Part* out) {
     int n = 0;
-    for (int l = -((halo + dim - 1) / dim); l * dim < leaves * dim + halo; ++l) {
-        const int from = std::max(l * dim, -halo), to = std::min((l + 1) * dim, leaves * dim + halo);
-        out[n++] = {l, from - l * dim, to - l * dim, from + halo};
+    for (int l = floor_div(begin - halo, dim); l * dim < end + halo; ++l) {
+        const int from = std::max(l * dim, begin - halo), to = std::min((l + 1) * dim, end + halo);
+        out[n++] = {l, from - l * dim, to - l * dim, from + lead, (l + 1) * dim > begin && l * dim < end};
     }
     return n;
 }
@@ -27,15 +28,18 @@ TileGather::TileGather(const BlockLayout& layout, BlockLayout::Run run, int halo
     : layout_(layout), run_(run), halo_(halo), stride_(stride_of(halo)), kernels_(kernels()) {
     const auto& first = layout.cells()[static_cast<std::size_t>(run.first)];
     origin_ = first.origin;
-    x_begin_ = origin_.x();
-    x_end_ = x_begin_ + (run.last - run.first) * BlockLayout::size_x;
-    y_count_ = parts(BlockLayout::leaves_y, halo, y_);
-    z_count_ = parts(BlockLayout::leaves_z, lead_of(halo), z_);
+    work_ = layout.work_in(first);
+    work_.expand(layout.work_in(layout.cells()[static_cast<std::size_t>(run.last - 1)]));
+    y_count_ = parts(y_begin(), y_end(), halo, halo, y_);
+    // Whole leaves along z.
+    const int z_begin = floor_div(work_.min().z() - origin_.z(), dim) * dim,
+              z_end = (floor_div(work_.max().z() - origin_.z(), dim) + 1) * dim, lead = lead_of(halo);
+    z_count_ = parts(z_begin, z_end, lead, lead, z_);
 }
 
 void TileGather::find_bricks(int layer, std::int32_t* to) const {
     const int cell_x =
-        std::clamp(floor_div(layer * dim - x_begin_, BlockLayout::size_x), -1, run_.last - run_.first);
+        std::clamp(floor_div(layer * dim - origin_.x(), BlockLayout::size_x), -1, run_.last - run_.first);
     // The run's cell next to it: neighbours of the cells at the ends reach beyond the run.
     const int base = std::clamp(cell_x, 0, run_.last - run_.first - 1);
     const auto& cell = layout_.cells()[static_cast<std::size_t>(run_.first + base)];
@@ -153,10 +157,9 @@ void TileGather::find_spans(RowSpan* spans) const {
 void TileGather::scatter(const float* plane, float* bricks) const {
     const int in_leaf = (x_ & (dim - 1)) * dim * dim;
     for_leaves([&](std::int32_t brick, const Part& y, const Part& z) {
-        if (brick == BlockLayout::none) return;
-        if (y.leaf < 0 || y.leaf >= BlockLayout::leaves_y || z.leaf < 0 || z.leaf >= BlockLayout::leaves_z)
-            return;
-        kernels_.collect(plane + y.at * stride_ + z.at, stride_,
+        if (brick == BlockLayout::none || !y.own || !z.own) return;
+        // Whole leaves, also where not all of their rows were gathered.
+        kernels_.collect(plane + (y.at - y.from) * stride_ + z.at, stride_,
                          bricks + static_cast<std::size_t>(brick) * BlockField::brick_size + in_leaf);
     });
 }

@@ -12,6 +12,8 @@
 namespace vdbgeo::stencil {
 namespace {
 
+using openvdb::CoordBBox;
+
 struct Shape {
     explicit Shape(int h)
         : halo(h),
@@ -63,6 +65,8 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
     Tile& t = a.tile;
     t.cell = static_cast<std::size_t>(cell);
     t.origin = gather.origin();
+    const CoordBBox work = layout.work_in(layout.cells()[t.cell]);
+    t.work = {work.min() - t.origin, work.max() - t.origin};
     const std::ptrdiff_t corner = s.halo * s.stride + s.lead;
     for (int x = -s.halo; x < BlockLayout::size_x + s.halo; ++x) {
         gather.move_to(t.origin.x() + x);

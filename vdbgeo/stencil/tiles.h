@@ -24,6 +24,9 @@ struct Tile {
     float* active;                ///< 1 in active voxels, 0 in the others
     std::vector<float*> scratch;  ///< arrays of the same shape, to work in; not cleared from tile to tile
     std::vector<float*> out;      ///< what is copied back of the cell's active leaves; 0 before
+    /// Voxels of the cell, counted from its origin, that the layout works on: there, and as far as the halo
+    /// reaches around it, is what was gathered.
+    openvdb::CoordBBox work;
 
     std::ptrdiff_t at(int x, int y, int z) const { return x * stride_x + y * stride_y + z; }
     /// Active part of the row, z counted as above; empty where begin ≥ end.

@@ -191,7 +191,8 @@ bool in_blocks(const MapFilterFlags& flags, const MemoryNeed& need) {
            memory_for_blocks(options.memory_limit(), 0) > 0;
 }
 
-BlockedOutcome filter_in_blocks(const MapFilterFlags& flags, const BlockedCommand& command, Session& session) {
+BlockedOutcome filter_in_blocks(const MapFilterFlags& flags, const BlockedCommand& command,
+                                Session& session) {
     give_large_memory_back_at_once();
     BlockedOutcome out;
     Clock clock;

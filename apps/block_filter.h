@@ -30,10 +30,10 @@ struct BlockedCommand {
 
 struct BlockedOutcome {
     HyperdiffusionReport report;
-    Statistics statistics;     ///< of the new map
-    double deviation = 0;      ///< of the values there were
-    Json result;               ///< filter_result, statistics_json, what there is to say of the file
-    Json seconds;              ///< read, compute, write
+    Statistics statistics;  ///< of the new map
+    double deviation = 0;   ///< of the values there were
+    Json result;            ///< filter_result, statistics_json, what there is to say of the file
+    Json seconds;           ///< read, compute, write
 };
 
 /// Reads the map block by block, computes, and writes what comes out.

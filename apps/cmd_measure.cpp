@@ -4,10 +4,13 @@
 #include <filesystem>
 
 #include "apps/command.h"
+#include "apps/flags.h"
 #include "apps/plots.h"
 #include "apps/reports.h"
 #include "apps/stages.h"
+#include "converters/map_options.h"
 #include "converters/mesh_file.h"
+#include "converters/stored_ply.h"
 #include "vdbgeo/measure/surface_distance.h"
 
 namespace vdbgeo::app {
@@ -15,16 +18,37 @@ namespace {
 
 struct MeasureOptions {
     std::vector<std::string> in;
-    std::string histogram, distance;
+    std::string histogram, distance, memory;
     PlotFlags plots;
+
+    std::uint64_t limit() const {
+        MapReadOptions options;
+        if (!memory.empty()) options.memory = parse_bytes("--memory", memory);
+        return options.memory_limit();
+    }
 };
+
+/// The mesh, to be looked up in its file, where it would not fit into memory; null where it is to be read.
+std::unique_ptr<StoredMesh> too_large(const std::string& file, const MeasureOptions& o) {
+    constexpr double bytes_a_face = 50, bytes_a_vertex = 40;
+    if (!has_ending(file, ".ply") || !o.distance.empty()) return nullptr;
+    auto stored = stored_ply(file);
+    if (!stored) return nullptr;
+    const double all = bytes_a_face * double(stored->faces()) + bytes_a_vertex * double(stored->vertices());
+    return all > double(o.limit()) ? std::move(stored) : nullptr;
+}
 
 Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures& measures, Session& session) {
     Json seconds;
     Clock clock;
-    const TriMesh mesh = read_mesh(file, session.stage("reading"));
-    seconds["read"] = clock.lap();
-    measures = measure_mesh(mesh, session.stage("measuring"));
+    TriMesh mesh;
+    if (const auto stored = too_large(file, o)) {
+        measures = naming(file, [&] { return measure_mesh(*stored, o.limit(), session.stage("measuring")); });
+    } else {
+        mesh = read_mesh(file, session.stage("reading"));
+        seconds["read"] = clock.lap();
+        measures = measure_mesh(mesh, session.stage("measuring"));
+    }
     seconds["compute"] = clock.lap();
     session.end_stage();
     Json j{{"file", file}};
@@ -45,6 +69,7 @@ Json measure_one(const std::string& file, const MeasureOptions& o, MeshMeasures&
 }
 
 void run_measure(const MeasureOptions& o, Session& session) {
+    o.limit();
     check_plot_output(o.histogram);
     o.plots.check(!o.histogram.empty(), "--histogram");
     check_folder_of(o.histogram);
@@ -82,6 +107,10 @@ Command measure_command() {
                 o->plots.add(app);
                 app.add_option("--distance", o->distance,
                                "Measure how far the mesh is from this one, both ways, in Å");
+                app.add_option(
+                    "--memory", o->memory,
+                    "Memory that may be taken, such as 2G or 512M: a .ply file that does not fit is "
+                    "measured part by part [half of the machine's]");
                 return [o](Session& session) { run_measure(*o, session); };
             }};
 }

@@ -155,9 +155,11 @@ Command model_command() {
             return [flags, &app](Session& session) {
                 if (flags->print_options) return session.say(all_options_text());
                 gather(*flags, app);
-                const Json summary = run_model(flags->options, session);
-                if (!session.json) say_summary(summary, flags->options.folder, session);
-                session.result(summary);
+                lead_or_follow(session, [&](const RunLine& run) {
+                    const Json summary = run_model(flags->options, session, run);
+                    if (!session.json) say_summary(summary, flags->options.folder, session);
+                    session.result(summary);
+                });
             };
         }};
 }

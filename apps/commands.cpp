@@ -75,7 +75,7 @@ std::vector<Command> all_commands() {
 }
 
 std::vector<Command> team_commands() {
-    return {denoise_command(), edges_command(), flow_command(), surface_command()};
+    return {denoise_command(), edges_command(), flow_command(), surface_command(), model_command()};
 }
 
 int run(int argc, char** argv, const std::vector<Command>& commands, const std::string& program, bool single,

@@ -26,8 +26,10 @@ namespace fs = std::filesystem;
 
 class ModelRun {
  public:
-    ModelRun(const ModelOptions& options, Session& session) : options_(options), session_(session) {
+    ModelRun(const ModelOptions& options, Session& session, const RunLine& run_line)
+        : options_(options), session_(session), run_line_(run_line) {
         state_.in = options.in;
+        state_.by_team = session.team != nullptr;
         state_.folder = options.folder;
         state_.sections = options.sections();
         if (!can_render()) {
@@ -68,6 +70,7 @@ class ModelRun {
 
     const ModelOptions& options_;
     Session& session_;
+    const RunLine& run_line_;
     ModelState state_;
     Json old_, summary_;
     std::string program_;
@@ -228,7 +231,7 @@ void ModelRun::run_stage(const ModelStage& stage, const ModelStage::Lines& lines
     try {
         for (const auto& line : lines) {
             progress.report(0);
-            const Session::Kept kept = run_words(line, stage.name, session_);
+            const Session::Kept kept = run_line_(line, stage.name);
             // The first line's result is the stage's; pictures have none worth keeping.
             if (!entry.contains("result") && std::string(stage.name) != "pictures")
                 entry["result"] = kept.result;
@@ -326,6 +329,8 @@ Json ModelRun::run() {
 
 }  // namespace
 
-Json run_model(const ModelOptions& options, Session& session) { return ModelRun(options, session).run(); }
+Json run_model(const ModelOptions& options, Session& session, const RunLine& run) {
+    return ModelRun(options, session, run).run();
+}
 
 }  // namespace vdbgeo::app

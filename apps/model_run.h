@@ -3,6 +3,7 @@
 
 #include "apps/model_options.h"
 #include "apps/session.h"
+#include "apps/team_lines.h"
 
 namespace vdbgeo::app {
 
@@ -15,6 +16,8 @@ namespace vdbgeo::app {
 /// Errors: what the commands throw, once the summary says so. A stage that is not essential may fail: the
 /// others go on, and NumericalError is thrown at the end. UsageError for options that no stage knows;
 /// InvalidInput where a file is missing that a stage before `from` should have left.
-Json run_model(const ModelOptions& options, Session& session);
+///
+/// `run` runs the stages' command lines. In a team the noise removal draws no pictures.
+Json run_model(const ModelOptions& options, Session& session, const RunLine& run);
 
 }  // namespace vdbgeo::app

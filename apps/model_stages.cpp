@@ -96,12 +96,13 @@ Names picture_inputs(const ModelState& m) {
 }
 
 Lines denoise_lines(const ModelState& m) {
-    return {compose({"denoise", m.at("density.vdb"), m.at("smooth.vdb"), "--slices", m.at("slices"),
-                     "--spectra", m.at("spectra.svg")},
-                    {}, m, "denoise")};
+    Words words{"denoise", m.at("density.vdb"), m.at("smooth.vdb")};
+    if (!m.by_team) words.insert(words.end(), {"--slices", m.at("slices"), "--spectra", m.at("spectra.svg")});
+    return {compose(words, {}, m, "denoise")};
 }
 
-Names denoise_files(const ModelState&) {
+Names denoise_files(const ModelState& m) {
+    if (m.by_team) return {"smooth.vdb"};
     Names names{"smooth.vdb", "spectra.svg"};
     for (const char axis : {'x', 'y', 'z'})
         for (const char* when : {"before", "after"})

@@ -13,6 +13,7 @@ struct ModelState {
     std::string in, folder;
     Json sections;                  ///< the options of all stages; false: the stage is left out
     Json results = Json::object();  ///< of the stages so far, by name
+    bool by_team = false;           ///< which draws no pictures while noise is removed
 
     bool on(const std::string& stage) const;
     /// The path of a file of the folder.

@@ -28,10 +28,11 @@ Command find_command(const std::string& name) {
     throw UsageError(fmt::format("there is no command {}", name));
 }
 
-void check_words(const std::vector<std::string>& words) {
+void check_words(const std::vector<std::string>& words, Team* team) {
     CLI::App app;
     const auto body = parse(app, words);
     Session session = Session::rehearsal();
+    session.team = team;
     try {
         body(session);
     } catch (const UsageError&) {
@@ -42,11 +43,12 @@ void check_words(const std::vector<std::string>& words) {
 }
 
 Session::Kept run_words(const std::vector<std::string>& words, const std::string& name,
-                        const Session& session) {
+                        const Session& session, Team* team) {
     CLI::App app;
     const auto body = parse(app, words);
     const auto kept = std::make_shared<Session::Kept>();
     Session step = session.step(name, kept);
+    step.team = team;
     body(step);
     step.end_stage();
     return *kept;

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "tests/blocks/noisy_map.h"
 #include "tests/blocks/results.h"
 #include "tests/support/temp_folder.h"
@@ -24,58 +22,58 @@ MapSource source_of(const FloatGrid& grid) {
             [&grid](const CoordBBox& box) { return part_of(grid, box); }};
 }
 
-/// How many values differ, and that none is missing.
 struct Shape {
     const char* name;
     std::optional<Coord> size;
     std::optional<int> steps;
     std::uint64_t memory;
-    bool small = false;  ///< a map of few cells
 };
 
-class BlockedHyperdiffusion : public ::testing::TestWithParam<Shape> {};
+class BlockedHyperdiffusion : public ::testing::TestWithParam<test::DiffusionSetting> {
+ protected:
+    /// By blocks of these shapes.
+    static void expect_same_bits(const FloatGrid& input, const std::vector<Shape>& shapes) {
+        const test::TempFolder folder;
+        const FloatGrid::Ptr expected = input.deepCopy();
+        const HyperdiffusionReport alone = hyperdiffuse(*expected, GetParam().options);
+        for (const Shape& shape : shapes) {
+            SCOPED_TRACE(shape.name);
+            HyperdiffusionReport report;
+            const BlockOptions options{shape.memory, folder.path(), shape.size, shape.steps, {}};
+            std::unique_ptr<BlockedDiffusion> solver;
+            ASSERT_NO_THROW(solver =
+                                hyperdiffuse_blocks(source_of(input), GetParam().options, options, report));
+            ASSERT_TRUE(solver);
+            EXPECT_GT(solver->most_blocks(), shape.name == std::string("large") ? 0u : 1u);
+            const FloatGrid::Ptr made = test::stored(*solver, input, report);
+            EXPECT_EQ(report.steps, alone.steps);
+            EXPECT_EQ(report.time, alone.time);
+            EXPECT_EQ(report.noise, alone.noise);
+            EXPECT_EQ(report.removed, alone.removed);
+            EXPECT_EQ(report.mean_before, alone.mean_before);
+            EXPECT_EQ(report.mean_after, alone.mean_after);
+            EXPECT_EQ(report.active_voxels, alone.active_voxels);
+            EXPECT_EQ(expected->activeVoxelCount(), made->activeVoxelCount());
+            EXPECT_EQ(test::different(*expected, *made), 0u);
+        }
+        EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+    }
+};
 
 TEST_P(BlockedHyperdiffusion, HasTheBitsOfOneGrid) {
-    static const FloatGrid::Ptr large = test::noisy_map(),
-                                small = test::noisy_map(CoordBBox(Coord(0, -10, 20), Coord(60, 70, 150)));
-    const FloatGrid::Ptr input = GetParam().small ? small : large;
-    const test::TempFolder folder;
-    const Shape& shape = GetParam();
-    for (const test::DiffusionSetting& setting : test::diffusion_settings()) {
-        SCOPED_TRACE(setting.name);
-        static std::map<std::string, std::pair<FloatGrid::Ptr, HyperdiffusionReport>> in_one;
-        auto& [expected, alone] = in_one[setting.name + std::string(shape.small ? " small" : "")];
-        if (!expected) {
-            expected = input->deepCopy();
-            alone = hyperdiffuse(*expected, setting.options);
-        }
-        HyperdiffusionReport report;
-        const BlockOptions options{shape.memory, folder.path(), shape.size, shape.steps, {}};
-        std::unique_ptr<BlockedDiffusion> solver;
-        ASSERT_NO_THROW(solver = hyperdiffuse_blocks(source_of(*input), setting.options, options, report));
-        ASSERT_TRUE(solver);
-        EXPECT_GT(solver->most_blocks(), shape.name == std::string("large") ? 0u : 1u);
-        const FloatGrid::Ptr made = test::stored(*solver, *input, report);
-        EXPECT_EQ(report.steps, alone.steps);
-        EXPECT_EQ(report.time, alone.time);
-        EXPECT_EQ(report.noise, alone.noise);
-        EXPECT_EQ(report.removed, alone.removed);
-        EXPECT_EQ(report.mean_before, alone.mean_before);
-        EXPECT_EQ(report.mean_after, alone.mean_after);
-        EXPECT_EQ(report.active_voxels, alone.active_voxels);
-        EXPECT_EQ(expected->activeVoxelCount(), made->activeVoxelCount());
-        EXPECT_EQ(test::different(*expected, *made), 0u);
-    }
-    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+    expect_same_bits(*test::noisy_map(), {{"pencils", Coord(128, 64, 128), 8, 0},
+                                          {"slabs of few steps", Coord(128, 32, 512), 4, 0},
+                                          {"by memory", {}, {}, 24000000},
+                                          {"large", {}, {}, 2000000000}});
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, BlockedHyperdiffusion,
-                         ::testing::Values(Shape{"cells", Coord(32, 32, 128), {}, 0, true},
-                                           Shape{"pencils", Coord(128, 64, 128), 8, 0},
-                                           Shape{"slabs_of_few_steps", Coord(128, 32, 512), 4, 0},
-                                           Shape{"by_memory", {}, {}, 24000000},
-                                           Shape{"large", {}, {}, 2000000000}),
-                         [](const auto& p) { return std::string(p.param.name); });
+TEST_P(BlockedHyperdiffusion, OfSingleCellsToo) {
+    expect_same_bits(*test::noisy_map(CoordBBox(Coord(0, -10, 20), Coord(60, 70, 150))),
+                     {{"cells", Coord(32, 32, 128), {}, 0}});
+}
+
+INSTANTIATE_TEST_SUITE_P(Settings, BlockedHyperdiffusion, ::testing::ValuesIn(test::diffusion_settings()),
+                         test::name_of_setting);
 
 TEST(BlockedHighPass, HasTheBitsOfOneGrid) {
     const FloatGrid::Ptr input = test::noisy_map(CoordBBox(Coord(0, -10, 20), Coord(70, 90, 150)));

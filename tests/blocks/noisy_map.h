@@ -1,6 +1,9 @@
 // What is diffused in parts, and how.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <cctype>
 #include <string>
 #include <vector>
 
@@ -51,6 +54,13 @@ inline std::vector<DiffusionSetting> diffusion_settings() {
     all.back().options.steps = 7;
     all.back().options.fidelity = 0.1;
     return all;
+}
+
+/// For the names of tests: letters and digits.
+inline std::string name_of_setting(const ::testing::TestParamInfo<DiffusionSetting>& info) {
+    std::string name;
+    for (const char c : std::string(info.param.name)) name += std::isalnum(c) ? c : '_';
+    return name;
 }
 
 }  // namespace vdbgeo::test

@@ -1,9 +1,9 @@
 // Hyperdiffusion by a team gives each voxel the bits that it gets in one grid.
 #include <gtest/gtest.h>
 
-#include <map>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "tests/blocks/noisy_map.h"
 #include "tests/blocks/results.h"
@@ -20,33 +20,30 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 
-class TeamHyperdiffusion : public ::testing::TestWithParam<std::pair<int, int>> {};
+class TeamHyperdiffusion : public ::testing::TestWithParam<test::DiffusionSetting> {};
 
 TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
-    static const FloatGrid::Ptr input = test::noisy_map();
-    const auto boxes = partition(test::noisy_box, GetParam());
-    for (const test::DiffusionSetting& setting : test::diffusion_settings()) {
-        SCOPED_TRACE(setting.name);
-        static std::map<std::string, std::pair<FloatGrid::Ptr, HyperdiffusionReport>> in_one;
-        auto& [expected, alone] = in_one[setting.name];
-        if (!expected) {
-            expected = input->deepCopy();
-            alone = hyperdiffuse(*expected, setting.options);
-        }
+    const FloatGrid::Ptr input = test::noisy_map(), expected = input->deepCopy();
+    const HyperdiffusionOptions& options = GetParam().options;
+    const HyperdiffusionReport alone = hyperdiffuse(*expected, options);
+    for (const auto& parts :
+         std::vector<std::pair<int, int>>{{1, 1}, {2, 1}, {1, 2}, {2, 2}, {5, 1}, {6, 3}, {13, 1}}) {
+        SCOPED_TRACE(std::to_string(parts.first) + " by " + std::to_string(parts.second));
+        const auto boxes = partition(test::noisy_box, parts);
         std::mutex mutex;
         std::uint64_t different = 0, seen = 0;
-        test::ThreadTeam(static_cast<int>(boxes.size())).run([&, grid = expected, told = alone](Team& team) {
-            const stencil::Share share{&team, boxes, hyperdiffusion_halo(setting.options)};
+        test::ThreadTeam(static_cast<int>(boxes.size())).run([&](Team& team) {
+            const stencil::Share share{&team, boxes, hyperdiffusion_halo(options)};
             const FloatGrid::Ptr part = part_of(*input, share.with_ghosts(team.rank()));
-            const HyperdiffusionReport report = hyperdiffuse(*part, setting.options, {}, &share);
+            const HyperdiffusionReport report = hyperdiffuse(*part, options, {}, &share);
             const std::lock_guard<std::mutex> lock(mutex);
-            EXPECT_EQ(report.steps, told.steps);
-            EXPECT_EQ(report.time, told.time);
-            EXPECT_EQ(report.noise, told.noise);
-            EXPECT_EQ(report.removed, told.removed);
-            EXPECT_EQ(report.mean_after, told.mean_after);
-            EXPECT_EQ(report.active_voxels, told.active_voxels);
-            different += test::different(*part, *grid);
+            EXPECT_EQ(report.steps, alone.steps);
+            EXPECT_EQ(report.time, alone.time);
+            EXPECT_EQ(report.noise, alone.noise);
+            EXPECT_EQ(report.removed, alone.removed);
+            EXPECT_EQ(report.mean_after, alone.mean_after);
+            EXPECT_EQ(report.active_voxels, alone.active_voxels);
+            different += test::different(*part, *expected);
             for (auto it = part->cbeginValueOn(); it; ++it) seen += share.own().isInside(it.getCoord());
         });
         EXPECT_EQ(different, 0u);
@@ -54,12 +51,8 @@ TEST_P(TeamHyperdiffusion, HasTheBitsOfOneGrid) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shares, TeamHyperdiffusion,
-                         ::testing::Values(std::pair(1, 1), std::pair(2, 1), std::pair(1, 2), std::pair(2, 2),
-                                           std::pair(5, 1), std::pair(6, 3), std::pair(13, 1)),
-                         [](const auto& p) {
-                             return std::to_string(p.param.first) + "_by_" + std::to_string(p.param.second);
-                         });
+INSTANTIATE_TEST_SUITE_P(Settings, TeamHyperdiffusion, ::testing::ValuesIn(test::diffusion_settings()),
+                         test::name_of_setting);
 
 /// Bytes of an exchange: those of the own leaves in the halos of others, for each field.
 TEST(TeamHyperdiffusionTraffic, IsWhatTheHalosHold) {

@@ -130,6 +130,37 @@ TEST_F(Mpi, ExtractsTheSameSurface) {
     EXPECT_FALSE(fs::exists(at("b.ply.unfinished")));
 }
 
+TEST_F(Mpi, AModelHasTheSameFiles) {
+    const std::string map = phantom("t.mrc", 64, {"--snr", "1"}, "torus");
+    const auto words = [&](const std::string& folder, const Words& more) {
+        Words all{"model", map,       "-o",     at(folder), "--width",  "200",   "--occlusion",
+                  "0",     "--quiet", "--json", "--preset", "tomogram", "--set", "denoise.order=1"};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    good(words("one", {}));
+    const Ended r = mpi(2, words("two", {}));
+    ASSERT_EQ(r.code, 0) << r.err;
+    const Json summary = Json::parse(r.out, nullptr, false);
+    ASSERT_TRUE(summary.is_object()) << r.out;
+    EXPECT_EQ(summary["status"], "done");
+    for (const Json& stage : summary["stages"])
+        if (stage["name"] == "denoise" || stage["name"] == "surface")
+            EXPECT_EQ(stage["result"]["members"], 2) << stage["name"];
+    for (const char* name : {"density.vdb", "smooth.vdb", "surface.ply", "mesh.ply", "curved.ply",
+                             "pockets.csv", "tets.vtu", "map.png", "mean.png", "angles.svg"})
+        EXPECT_TRUE(bytes(std::string("one/") + name) == bytes(std::string("two/") + name)) << name;
+    EXPECT_FALSE(std::filesystem::exists(at("two/spectra.svg")));
+    EXPECT_TRUE(std::filesystem::exists(at("two/report.html")));
+    // What the first alone finds wrong ends all.
+    const Ended usage = mpi(2, words("two", {"--from", "tets", "--to", "map"}));
+    EXPECT_EQ(usage.code, 2);
+    EXPECT_EQ(usage.err, "vdbgeo-mpi: error: --from tets comes after --to map\n");
+    const Ended missing = mpi(2, {"model", at("none.mrc"), "-o", at("three"), "--quiet"});
+    EXPECT_EQ(missing.code, 4);
+    EXPECT_NE(missing.err.find("none.mrc"), std::string::npos) << missing.err;
+}
+
 TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {
     const std::string map = phantom("a.mrc", 40);
     const auto expect = [&](int processes, const Words& words, int code, const std::string& text) {

@@ -261,6 +261,21 @@ TEST_F(Surfaces, HistogramOfSeveralMeshes) {
     EXPECT_EQ(bytes("h.png").substr(1, 3), "PNG");
 }
 
+TEST_F(Surfaces, MeasuresOfAMeshLargerThanMemory) {
+    const std::string map = phantom("n.mrc", 128, {"--snr", "0.05"}, "atpase");
+    good({"surface", map, at("n.ply"), "--iso", "0", "--quiet"});
+    const Json whole = json({"measure", at("n.ply")});
+    EXPECT_GT(whole["faces"].get<std::uint64_t>(), 3000000u);
+    const Ended r = good({"measure", at("n.ply"), "--memory", "150M", "--json", "--quiet"});
+    Json parts = Json::parse(r.out, nullptr, false);
+    parts["seconds"] = whole["seconds"];
+    EXPECT_EQ(parts, whole);
+    if (!sanitized) EXPECT_LT(r.peak_bytes, std::uint64_t(150) << 20);
+    expect_error(vdbgeo({"measure", at("n.ply"), "--memory", "40M", "--quiet"}), 5, at("n.ply"),
+                 "does not fit");
+    expect_error(vdbgeo({"measure", at("n.ply"), "--memory", "much"}), 2, "--memory");
+}
+
 TEST_F(Surfaces, DistanceBetweenTwoMeshes) {
     const std::string a = mesh("a.ply", icosphere(4, 10)), b = mesh("b.ply", icosphere(4, 11));
     const Json j = json({"measure", a, "--distance", b});

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <random>
 
 #include "tests/support/small_meshes.h"
 #include "vdbgeo/core/errors.h"
@@ -20,7 +21,121 @@ MeshMeasures triangle(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
     return measure_mesh(mesh_of({a, b, c}, {{0, 1, 2}}));
 }
 
+/// A mesh in memory that is looked up like one in a file.
+class LookedUp : public StoredMesh {
+ public:
+    explicit LookedUp(const TriMesh& mesh) : mesh_(mesh), caps_(mesh.find_face_property(cap_property)) {}
+    std::uint64_t vertices() const override { return mesh_.points.size(); }
+    std::uint64_t faces() const override { return mesh_.triangles.size(); }
+    void read_faces(std::uint64_t first, std::size_t count, Triangle* triangles, char* caps) const override {
+        for (std::size_t f = 0; f < count; ++f) {
+            triangles[f] = mesh_.triangles[first + f];
+            caps[f] = caps_ && caps_->values[first + f] > 0.5f;
+        }
+    }
+    Vec3f point(VertexId v) const override { return mesh_.points[v]; }
+    void release() const override {}
+
+ private:
+    const TriMesh& mesh_;
+    const MeshProperty* caps_;
+};
+
+void expect_same(const MeshMeasures& a, const MeshMeasures& b) {
+    EXPECT_EQ(a.vertices, b.vertices);
+    EXPECT_EQ(a.faces, b.faces);
+    EXPECT_EQ(a.edges, b.edges);
+    EXPECT_EQ(a.unused_vertices, b.unused_vertices);
+    EXPECT_EQ(a.components, b.components);
+    EXPECT_EQ(a.boundary_edges, b.boundary_edges);
+    EXPECT_EQ(a.non_manifold_edges, b.non_manifold_edges);
+    EXPECT_EQ(a.misoriented_edges, b.misoriented_edges);
+    EXPECT_EQ(a.non_manifold_vertices, b.non_manifold_vertices);
+    EXPECT_EQ(a.degenerate_faces, b.degenerate_faces);
+    EXPECT_EQ(a.duplicate_faces, b.duplicate_faces);
+    EXPECT_EQ(a.holes, b.holes);
+    EXPECT_EQ(a.euler_characteristic, b.euler_characteristic);
+    EXPECT_EQ(a.closed, b.closed);
+    EXPECT_EQ(a.oriented, b.oriented);
+    EXPECT_EQ(a.manifold, b.manifold);
+    EXPECT_EQ(a.area_A2, b.area_A2);
+    EXPECT_EQ(a.cap_area_A2, b.cap_area_A2);
+    EXPECT_EQ(a.volume_A3, b.volume_A3);
+    EXPECT_EQ(a.genus, b.genus);
+    EXPECT_EQ(a.min_angle_deg, b.min_angle_deg);
+    EXPECT_EQ(a.max_angle_deg, b.max_angle_deg);
+    EXPECT_EQ(a.mean_angle_deg, b.mean_angle_deg);
+    EXPECT_EQ(a.angle_histogram, b.angle_histogram);
+    EXPECT_EQ(a.angles_below_30_fraction, b.angles_below_30_fraction);
+    EXPECT_EQ(a.radius_edge_max, b.radius_edge_max);
+    EXPECT_EQ(a.radius_edge_mean, b.radius_edge_mean);
+    EXPECT_EQ(a.radius_edge_histogram, b.radius_edge_histogram);
+}
+
+/// What is held beside the faces of a range.
+std::uint64_t held(const TriMesh& mesh) { return 4 * mesh.points.size() + 50000000; }
+
+/// A patch of a lattice of n × n points, and faces at random: open, not manifold, turned, twice there,
+/// without area, with corners far apart; some are caps.
+TriMesh messy(int n, int more) {
+    std::mt19937 random(5);
+    const auto below = [&](std::size_t count) { return static_cast<VertexId>(random() % count); };
+    std::vector<Vec3f> points;
+    std::vector<Triangle> triangles;
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x)
+            points.emplace_back(static_cast<float>(x), static_cast<float>(y),
+                                static_cast<float>(random() % 97) / 97);
+    for (int y = 0; y + 1 < n; ++y)
+        for (int x = 0; x + 1 < n; ++x) {
+            const auto v = static_cast<VertexId>(y * n + x), up = v + static_cast<VertexId>(n);
+            if (random() % 50 != 0) triangles.push_back({v, v + 1, up + 1});
+            if (random() % 50 != 0) triangles.push_back({v, up + 1, up});
+        }
+    for (int i = 0; i < more; ++i) {
+        triangles.push_back({below(points.size()), below(points.size()), below(points.size())});
+        Triangle again = triangles[below(triangles.size())];
+        if (random() % 2 == 0) std::swap(again[0], again[1]);
+        triangles.push_back(again);
+        again[2] = again[0];
+        if (random() % 3 == 0) triangles.push_back(again);
+    }
+    points.emplace_back(1e6f, 0.0f, 0.0f);  // no face uses it
+    TriMesh mesh = mesh_of(points, triangles);
+    MeshProperty cap{cap_property, 1, {}};
+    for (std::size_t f = 0; f < triangles.size(); ++f) cap.values.push_back(random() % 9 == 0 ? 1.0f : 0.0f);
+    mesh.face_properties.push_back(cap);
+    return mesh;
+}
+
 }  // namespace
+
+TEST(StoredMeshMeasures, AreThoseOfTheMeshInMemory) {
+    for (const TriMesh& mesh :
+         {tetrahedron(), cube(), joined(cube({0, 0, 0}, 4), flipped(cube({1, 1, 1}, 1))), messy(30, 40),
+          messy(150, 0), TriMesh()})
+        for (const std::uint64_t faces : {std::uint64_t(60), std::uint64_t(3000), std::uint64_t(1000000)}) {
+            SCOPED_TRACE(std::to_string(mesh.triangles.size()) + " faces, " + std::to_string(faces) +
+                         " in a range");
+            expect_same(measure_mesh(LookedUp(mesh), held(mesh) + 80 * faces), measure_mesh(mesh));
+        }
+    const MeshMeasures m = measure_mesh(messy(30, 40));
+    EXPECT_TRUE(m.holes > 1 && m.duplicate_faces > 0 && m.non_manifold_edges > 0 &&
+                m.non_manifold_vertices > 0 && m.misoriented_edges > 0 && m.degenerate_faces > 0 &&
+                m.components > 0 && m.cap_area_A2 > 0);
+}
+
+TEST(StoredMeshMeasures, OfWhatDoesNotFitAreRefused) {
+    const TriMesh mesh = messy(30, 0);
+    EXPECT_THROW(measure_mesh(LookedUp(mesh), held(mesh) + 80), NumericalError);
+    EXPECT_THROW(measure_mesh(LookedUp(mesh), 0), NumericalError);
+    TriMesh odd = mesh;
+    odd.triangles[100][1] = 5000;
+    EXPECT_THROW(measure_mesh(LookedUp(odd), held(odd) + 1000000), InvalidInput);
+    odd = mesh;
+    odd.points[7].x() = std::numeric_limits<float>::infinity();
+    EXPECT_THROW(measure_mesh(LookedUp(odd), held(odd) + 1000000), InvalidInput);
+}
 
 TEST(MeshMeasures, ATetrahedron) {
     const MeshMeasures m = measure_mesh(tetrahedron());

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "tests/stencil/bricks.h"
 #include "tests/support/dense_oracle.h"
@@ -79,16 +80,18 @@ class Setting {
         return out;
     }
 
-    /// All sweeps; the last values of the fields.
-    std::vector<std::vector<float>> run() const {
-        const float nan = std::numeric_limits<float>::quiet_NaN();
+    /// All sweeps; the last values of the fields. `box`: so that they are right there, each sweep working on
+    /// as little as will do; what is not computed has to be finite then.
+    std::vector<std::vector<float>> run(const std::optional<openvdb::CoordBBox>& box = {}) const {
+        const float unset = box ? 1e30f : std::numeric_limits<float>::quiet_NaN();
+        BlockLayout layout = layout_;
         std::vector<std::unique_ptr<ShiftedField>> now, before;
         const std::size_t floats = layout_.brick_count() * 512;
         for (const Values& v : start_) {
             for (auto* list : {&now, &before}) {
                 list->push_back(std::make_unique<ShiftedField>(layout_));
-                std::fill_n(list->back()->next(), floats, nan);
-                std::fill_n(list->back()->now(), floats, nan);
+                std::fill_n(list->back()->next(), floats, unset);
+                std::fill_n(list->back()->now(), floats, unset);
             }
             test::to_bricks(layout_, oracle_, v, 0, now.back()->now());
         }
@@ -105,7 +108,12 @@ class Setting {
             at += n;
             for (std::size_t i = 0; i < case_.fields.size(); ++i)
                 plan.fields.push_back(field(i, now[i].get(), before[i].get()));
-            stencil::sweep(layout_, plan);
+            if (box) {
+                openvdb::CoordBBox wanted = *box;
+                wanted.expand(static_cast<int>(all.size() - at) * (highest_order() + 1));
+                layout.work_on(wanted);
+            }
+            stencil::sweep(layout, plan);
         }
         std::vector<std::vector<float>> out;
         for (const auto& f : now) {
@@ -113,6 +121,13 @@ class Setting {
             out.emplace_back(state.now(), state.now() + floats);
         }
         return out;
+    }
+
+    int highest_order() const {
+        int order = 0;
+        for (const FieldCase& f : case_.fields)
+            for (const int q : f.orders) order = std::max(order, q);
+        return order;
     }
 
     State expected() const {
@@ -250,6 +265,42 @@ TEST(Sweep, GivesTheSameBitsForAnyNumberOfThreads) {
                             std::memcmp(first[i].data(), again[i].data(), first[i].size() * sizeof(float)),
                             0);
                 });
+        }
+    }
+}
+
+/// Boxes that begin and end anywhere in leaves and cells.
+TEST(Sweep, OfAPartIsWhatItIsOfAll) {
+    using openvdb::Coord;
+    using openvdb::CoordBBox;
+    for (const std::string kind : {"cells", "shell"}) {
+        const auto grid = test::sparse_grid(kind, 9);
+        const CoordBBox all = grid->evalActiveVoxelBoundingBox();
+        const Coord middle((all.min().x() + all.max().x()) / 2, (all.min().y() + all.max().y()) / 2,
+                           (all.min().z() + all.max().z()) / 2);
+        for (const Case& c : cases()) {
+            SCOPED_TRACE(kind + ", " + c.name);
+            const Setting setting(*grid, c);
+            const auto whole = setting.run();
+            for (const CoordBBox& box :
+                 {CoordBBox(all.min(), middle), CoordBBox(middle, all.max()),
+                  CoordBBox(middle.offsetBy(-13, -9, -41), middle.offsetBy(6, 11, 30)),
+                  CoordBBox(Coord(all.min().x(), middle.y() & ~7, all.min().z()), all.max())}) {
+                const auto part = setting.run(box);
+                const BlockLayout& layout = setting.layout();
+                std::uint64_t different = 0, seen = 0;
+                for (std::size_t b = 0; b < layout.brick_count(); ++b)
+                    for (int k = 0; k < 512; ++k) {
+                        if (!test::is_active(layout, b, k) || !box.isInside(test::voxel_of(layout, b, k)))
+                            continue;
+                        const std::size_t at = b * 512 + static_cast<std::size_t>(k);
+                        ++seen;
+                        for (std::size_t i = 0; i < whole.size(); ++i)
+                            different += std::memcmp(&whole[i][at], &part[i][at], sizeof(float)) != 0;
+                    }
+                EXPECT_EQ(different, 0u) << box;
+                EXPECT_GT(seen, 50u) << box;
+            }
         }
     }
 }

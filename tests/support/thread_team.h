@@ -126,8 +126,7 @@ class ThreadTeam {
             team_.changed_.wait(lock, [&] { return !letters.empty(); });
             letter_ = std::move(letters.front());
             letters.pop_front();
-            if (letter_.size() != count_)
-                throw std::logic_error("a message of another length was expected");
+            if (letter_.size() != count_) throw std::logic_error("a message of another length was expected");
             return letter_.data();
         }
 

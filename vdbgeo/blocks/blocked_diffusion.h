@@ -74,8 +74,8 @@ class BlockedDiffusion : public CycleSolver, public BlockedResult {
     std::size_t most_blocks_ = 0, most_memory_ = 0;
 };
 
-/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. What was removed is
-/// found when it is stored, and not in the report. Null where no voxel is active.
+/// hyperdiffuse and coupled_high_pass of such a map; what they made is then in the solver. What was removed
+/// is found when it is stored, and not in the report. Null where no voxel is active.
 std::unique_ptr<BlockedDiffusion> hyperdiffuse_blocks(const MapSource& source,
                                                       const HyperdiffusionOptions& options,
                                                       const BlockOptions& blocks,

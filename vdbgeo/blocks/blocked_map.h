@@ -80,7 +80,8 @@ class BlockedMap {
 /// A field in files: what it was, and what it becomes.
 struct BrickGenerations {
     std::unique_ptr<BrickFile> now, next;
-    void turn() { std::swap(now, next); }
+    /// What was goes: what of it the system did not write to the disk so far, it never will.
+    void turn() { now = std::move(next); }
 };
 
 /// What next values are written to; made where it is not there.

@@ -29,9 +29,7 @@ std::pair<int, int> units_along(const CoordBBox& box, int axis) {
 }
 
 /// The first unit of a part, or the one behind the last part.
-int begin_of(int part, int units, int parts) {
-    return static_cast<int>(std::int64_t{units} * part / parts);
-}
+int begin_of(int part, int units, int parts) { return static_cast<int>(std::int64_t{units} * part / parts); }
 
 /// Voxels of the box in the longest of the parts along an axis.
 int longest(const CoordBBox& box, int axis, int parts) {
@@ -78,9 +76,10 @@ std::pair<int, int> parts_for(const CoordBBox& box, int members) {
         if (!best || work < best->first) best = {work, {j, k}};
     }
     if (!best)
-        throw InvalidInput(fmt::format("a map of {} x {} units of {} and {} voxels along y and z cannot be "
-                                       "shared out to {}: take fewer",
-                                       ny, nz, unit[1], unit[2], members));
+        throw InvalidInput(
+            fmt::format("a map of {} x {} units of {} and {} voxels along y and z cannot be "
+                        "shared out to {}: take fewer",
+                        ny, nz, unit[1], unit[2], members));
     return best->second;
 }
 

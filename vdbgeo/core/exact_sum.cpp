@@ -72,7 +72,8 @@ double ExactSum::value() const {
     }
     std::size_t top = digits;
     while (top > 0 && s.digit_[top - 1] == 0) --top;
-    // Three digits hold more bits than a double; of what is below them the lowest bit tells whether there is any.
+    // Three digits hold more bits than a double; of what is below them the lowest bit tells whether there is
+    // any.
     Wide value = 0;
     bool rest = false;
     for (std::size_t i = 0; i < top; ++i) {

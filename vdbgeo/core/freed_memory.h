@@ -16,9 +16,9 @@ inline void give_memory_back() {
 #endif
 }
 
-/// From now on large pieces of memory go back to the system when they are freed. The allocator would keep them
-/// for the next, and what comes and goes block after block, in sizes that differ a little, fits into them ever
-/// less. A piece that is made anew costs its pages: not for work in memory.
+/// From now on large pieces of memory go back to the system when they are freed. The allocator would keep
+/// them for the next, and what comes and goes block after block, in sizes that differ a little, fits into
+/// them ever less. A piece that is made anew costs its pages: not for work in memory.
 inline void give_large_memory_back_at_once() {
 #ifdef __GLIBC__
     mallopt(M_MMAP_THRESHOLD, 1 << 20);  // and no more what the allocator finds best

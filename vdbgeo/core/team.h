@@ -28,6 +28,9 @@ class Team {
     /// Adds up, number by number, what all gave; all give equally many.
     virtual void add_up(std::vector<std::uint64_t>& numbers) = 0;
 
+    /// Returns once all have called it. Who waits leaves the processor to others, which work meanwhile.
+    virtual void rest_until_all_come() { gather({}); }
+
     /// Messages of floats from one member to another arrive in their order, where they have one tag. Who
     /// sends has the one end, who receives the other, for as many messages as they like.
     class Outgoing {

@@ -105,7 +105,8 @@ class DiffusionFields {
     stencil::BlockField input_;  // X, where it is a target
 };
 
-/// Σ (X − offset − u)² over the active voxels of the bricks that a layout works on. The tree has their leaves.
+/// Σ (X − offset − u)² over the active voxels of the bricks that a layout works on. The tree has their
+/// leaves.
 ExactSum squared_change(const stencil::BlockLayout& layout, const openvdb::FloatTree& x, float offset,
                         const float* u);
 /// √(sum/count); 0 of nothing.

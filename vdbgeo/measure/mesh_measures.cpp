@@ -1,10 +1,15 @@
 #include "vdbgeo/measure/mesh_measures.h"
 
+#include <fmt/format.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "vdbgeo/core/disjoint_sets.h"
+#include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/core/vertex_faces.h"
 
@@ -24,18 +29,27 @@ struct Sums {
     std::array<std::uint64_t, 40> ratio_histogram{};
 };
 
-/// The mean of the faces' corners: points that no face uses may lie anywhere.
-Vec3d centre_of(const TriMesh& mesh) {
-    const Vec3d sum = fixed_order_reduce(
-        mesh.triangles.size(), block, Vec3d(Vec3d::Zero()),
+/// Faces one behind the other, and the points of their corners wherever they are.
+template <class PointAt>
+struct Faces {
+    const Triangle* triangles;
+    std::size_t count;
+    PointAt point;
+    std::function<bool(std::size_t)> cap;
+};
+
+/// Adds up the faces' corners: points that no face uses may lie anywhere.
+template <class PointAt>
+Vec3d sum_corners(const Faces<PointAt>& faces, const Vec3d& before) {
+    return fixed_order_reduce(
+        faces.count, block, before,
         [&](std::size_t begin, std::size_t end) {
             Vec3d s = Vec3d::Zero();
             for (std::size_t f = begin; f < end; ++f)
-                for (const VertexId v : mesh.triangles[f]) s += mesh.points[v].cast<double>();
+                for (const VertexId v : faces.triangles[f]) s += faces.point(v).template cast<double>();
             return s;
         },
         [](Vec3d& all, const Vec3d& part) { all += part; });
-    return sum / (3 * static_cast<double>(mesh.triangles.size()));
 }
 
 void add_angle(Sums& sums, double angle) {
@@ -82,37 +96,36 @@ void add_face(Sums& sums, const std::array<Vec3d, 3>& p, const Vec3d& centre, bo
     add_ratio(sums, std::sqrt(squared[1]) * std::sqrt(squared[2]) / (2 * twice_area));
 }
 
-Sums sum_faces(const TriMesh& mesh) {
-    const Vec3d centre = centre_of(mesh);
-    const MeshProperty* caps = mesh.find_face_property(cap_property);
-    const auto is_cap = [&](std::size_t f) {
-        return caps && caps->values[f * static_cast<std::size_t>(caps->components)] > 0.5f;
-    };
+void join_sums(Sums& all, const Sums& part) {
+    all.area += part.area;
+    all.cap_area += part.cap_area;
+    all.ratios += part.ratios;
+    all.max_ratio = std::max(all.max_ratio, part.max_ratio);
+    all.flat_faces += part.flat_faces;
+    for (std::size_t k = 0; k < all.ratio_histogram.size(); ++k)
+        all.ratio_histogram[k] += part.ratio_histogram[k];
+    all.volume += part.volume;
+    all.angles += part.angles;
+    all.min_angle = std::min(all.min_angle, part.min_angle);
+    all.max_angle = std::max(all.max_angle, part.max_angle);
+    for (std::size_t k = 0; k < all.histogram.size(); ++k) all.histogram[k] += part.histogram[k];
+}
+
+template <class PointAt>
+Sums sum_faces(const Faces<PointAt>& faces, const Vec3d& centre, const Sums& before) {
     return fixed_order_reduce(
-        mesh.triangles.size(), block, Sums{},
+        faces.count, block, before,
         [&](std::size_t begin, std::size_t end) {
             Sums s;
             for (std::size_t f = begin; f < end; ++f) {
                 std::array<Vec3d, 3> p;
-                for (std::size_t k = 0; k < 3; ++k) p[k] = mesh.points[mesh.triangles[f][k]].cast<double>();
-                add_face(s, p, centre, is_cap(f));
+                for (std::size_t k = 0; k < 3; ++k)
+                    p[k] = faces.point(faces.triangles[f][k]).template cast<double>();
+                add_face(s, p, centre, faces.cap && faces.cap(f));
             }
             return s;
         },
-        [](Sums& all, const Sums& part) {
-            all.area += part.area;
-            all.cap_area += part.cap_area;
-            all.ratios += part.ratios;
-            all.max_ratio = std::max(all.max_ratio, part.max_ratio);
-            all.flat_faces += part.flat_faces;
-            for (std::size_t k = 0; k < all.ratio_histogram.size(); ++k)
-                all.ratio_histogram[k] += part.ratio_histogram[k];
-            all.volume += part.volume;
-            all.angles += part.angles;
-            all.min_angle = std::min(all.min_angle, part.min_angle);
-            all.max_angle = std::max(all.max_angle, part.max_angle);
-            for (std::size_t k = 0; k < all.histogram.size(); ++k) all.histogram[k] += part.histogram[k];
-        });
+        join_sums);
 }
 
 /// One end of a boundary edge.
@@ -167,29 +180,32 @@ void count_star(const TriMesh& mesh, VertexStar& star, Counts& counts) {
     });
 }
 
-Counts count_stars(const TriMesh& mesh) {
+void join_counts(Counts& all, const Counts& part) {
+    all.used += part.used;
+    all.edges += part.edges;
+    all.boundary += part.boundary;
+    all.non_manifold += part.non_manifold;
+    all.misoriented += part.misoriented;
+    all.duplicates += part.duplicates;
+    all.split_vertices += part.split_vertices;
+    all.border.insert(all.border.end(), part.border.begin(), part.border.end());
+}
+
+/// Of the vertices [first, last).
+Counts count_stars(const TriMesh& mesh, std::size_t first, std::size_t last) {
     const VertexFaces faces(mesh);
     return fixed_order_reduce(
-        mesh.points.size(), block, Counts{},
+        last - first, block, Counts{},
         [&](std::size_t begin, std::size_t end) {
             Counts counts;
             VertexStar star;
-            for (std::size_t v = begin; v < end; ++v) {
+            for (std::size_t v = first + begin; v < first + end; ++v) {
                 star.fill(mesh, faces, static_cast<VertexId>(v));
                 if (star.face_count() > 0) count_star(mesh, star, counts);
             }
             return counts;
         },
-        [](Counts& all, const Counts& part) {
-            all.used += part.used;
-            all.edges += part.edges;
-            all.boundary += part.boundary;
-            all.non_manifold += part.non_manifold;
-            all.misoriented += part.misoriented;
-            all.duplicates += part.duplicates;
-            all.split_vertices += part.split_vertices;
-            all.border.insert(all.border.end(), part.border.begin(), part.border.end());
-        });
+        join_counts);
 }
 
 /// The ends come vertex by vertex. Those of one edge belong together, and those in one fan of a vertex.
@@ -210,8 +226,25 @@ std::uint64_t count_loops(const std::vector<BorderEnd>& ends) {
     return count;
 }
 
-void count_topology(const TriMesh& mesh, MeshMeasures& m) {
-    const Counts counts = count_stars(mesh);
+/// How faces join vertices to pieces.
+struct Pieces {
+    DisjointSets sets;
+    std::uint64_t joints = 0;  // each takes one piece away
+    std::uint64_t degenerate_faces = 0;
+
+    explicit Pieces(std::size_t vertices) : sets(vertices) {}
+    void add(const Triangle& t) {
+        degenerate_faces += degenerate(t);
+        if (degenerate(t)) return;
+        for (const VertexId other : {t[1], t[2]}) {
+            if (sets.find(t[0]) == sets.find(other)) continue;
+            sets.join(t[0], other);
+            ++joints;
+        }
+    }
+};
+
+void take_topology(const Counts& counts, const Pieces& pieces, MeshMeasures& m) {
     m.edges = counts.edges;
     m.boundary_edges = counts.boundary;
     m.non_manifold_edges = counts.non_manifold;
@@ -220,38 +253,18 @@ void count_topology(const TriMesh& mesh, MeshMeasures& m) {
     m.non_manifold_vertices = counts.split_vertices;
     m.holes = count_loops(counts.border);
     m.unused_vertices = m.vertices - counts.used;
-    DisjointSets pieces(mesh.points.size());
-    std::uint64_t joints = 0;  // each takes one piece away
-    for (const Triangle& t : mesh.triangles) {
-        m.degenerate_faces += degenerate(t);
-        if (degenerate(t)) continue;
-        for (const VertexId other : {t[1], t[2]}) {
-            if (pieces.find(t[0]) == pieces.find(other)) continue;
-            pieces.join(t[0], other);
-            ++joints;
-        }
-    }
-    m.components = counts.used - joints;
+    m.degenerate_faces = pieces.degenerate_faces;
+    m.components = counts.used - pieces.joints;
     m.euler_characteristic = static_cast<std::int64_t>(counts.used) - static_cast<std::int64_t>(m.edges) +
                              static_cast<std::int64_t>(m.faces - m.degenerate_faces);
-}
-
-}  // namespace
-
-MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress) {
-    check(mesh, "mesh");
-    MeshMeasures m;
-    m.vertices = mesh.points.size();
-    m.faces = mesh.triangles.size();
-    count_topology(mesh, m);
-    progress.report(0.8);
     m.closed = m.faces > m.degenerate_faces && m.boundary_edges == 0 && m.non_manifold_edges == 0;
     m.oriented = m.misoriented_edges == 0;
     m.manifold = m.non_manifold_edges == 0 && m.non_manifold_vertices == 0 && m.degenerate_faces == 0;
     if (m.closed && m.manifold && m.oriented)
         m.genus = (2 * static_cast<std::int64_t>(m.components) - m.euler_characteristic) / 2;
-    if (m.faces == 0) return m;
-    const Sums sums = sum_faces(mesh);
+}
+
+void take_sums(const Sums& sums, MeshMeasures& m) {
     m.area_A2 = sums.area;
     m.cap_area_A2 = sums.cap_area;
     if (m.closed && m.oriented) m.volume_A3 = sums.volume;
@@ -266,8 +279,185 @@ MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress) {
     if (m.faces > sums.flat_faces)
         m.radius_edge_mean = sums.ratios / static_cast<double>(m.faces - sums.flat_faces);
     m.radius_edge_histogram = sums.ratio_histogram;
+}
+
+/// Goes through a mesh that is stored somewhere.
+class StoredMeasure {
+    /// What was read last.
+    auto faces(std::size_t count) const {
+        const auto point = [this](VertexId v) { return mesh_.point(v); };
+        return Faces<decltype(point)>{triangles_.data(), count, point,
+                                      [this](std::size_t f) { return caps_[f] != 0; }};
+    }
+
+ public:
+    StoredMeasure(const StoredMesh& mesh, std::uint64_t memory, const Progress& progress)
+        : mesh_(mesh), memory_(memory), progress_(progress), triangles_(batch), caps_(batch) {}
+
+    MeshMeasures run() {
+        MeshMeasures m;
+        m.vertices = mesh_.vertices();
+        m.faces = mesh_.faces();
+        const Vec3d centre = check_and_find_centre();
+        Sums sums;
+        for_batches(0.2, [&](std::size_t count) { sums = sum_faces(faces(count), centre, sums); });
+        mesh_.release();
+        const std::uint64_t held = 4 * m.vertices + 50000000;
+        const std::uint64_t left = memory_ > held ? memory_ - held : 0;
+        Pieces pieces(m.vertices);
+        for_batches(0.3, [&](std::size_t count) {
+            for (std::size_t f = 0; f < count; ++f) pieces.add(triangles_[f]);
+        });
+        const std::vector<Range> ranges = ranges_of(left / bytes_a_face);
+        Counts counts;
+        for (std::size_t r = 0; r < ranges.size(); ++r)
+            add_range(ranges[r], 0.4 + 0.6 * double(r + 1) / double(ranges.size()), counts);
+        take_topology(counts, pieces, m);
+        if (m.faces > 0) take_sums(sums, m);
+        progress_.report(1);
+        return m;
+    }
+
+ private:
+    static constexpr std::size_t batch = 64 * block;  // faces
+    static constexpr std::uint64_t bytes_a_face = 80;
+
+    /// Vertices [first, last), and how many faces touch them at most.
+    struct Range {
+        VertexId first, last;
+        std::uint64_t faces;
+    };
+
+    /// Reads the faces batch by batch; `until`: how far all is when they are through.
+    template <class Body>
+    void for_batches(double until, const Body& body) {
+        const double from = done_;
+        for (std::uint64_t first = 0; first < mesh_.faces(); first += batch) {
+            const auto count =
+                static_cast<std::size_t>(std::min<std::uint64_t>(batch, mesh_.faces() - first));
+            first_ = first;
+            mesh_.read_faces(first, count, triangles_.data(), caps_.data());
+            body(count);
+            mesh_.release();
+            done_ = from + (until - from) * double(first + count) / double(mesh_.faces());
+            progress_.report(done_);
+        }
+    }
+    Vec3d check_and_find_centre() {
+        const std::uint64_t vertices = mesh_.vertices();
+        for (std::uint64_t begin = 0; begin < vertices; begin += batch, mesh_.release())
+            for (std::uint64_t v = begin; v < std::min<std::uint64_t>(vertices, begin + batch); ++v)
+                if (!mesh_.point(static_cast<VertexId>(v)).allFinite())
+                    throw InvalidInput(
+                        fmt::format("mesh: vertex {} has a coordinate that is not a finite number", v));
+        Vec3d sum = Vec3d::Zero();
+        for_batches(0.1, [&](std::size_t count) {
+            for (std::size_t f = 0; f < count; ++f)
+                for (const VertexId v : triangles_[f])
+                    if (v >= vertices)
+                        throw InvalidInput(
+                            fmt::format("mesh: face {} names vertex {} of {}", first_ + f, v, vertices));
+            sum = sum_corners(faces(count), sum);
+        });
+        return sum / (3 * static_cast<double>(mesh_.faces()));
+    }
+    /// Ranges of vertices that at most so many faces touch.
+    std::vector<Range> ranges_of(std::uint64_t most) {
+        constexpr std::uint64_t bins = 1 << 16;
+        const std::uint64_t wide = mesh_.vertices() / bins + 1;
+        std::vector<std::uint64_t> faces_of(bins, 0);
+        for_batches(0.4, [&](std::size_t count) {
+            for (std::size_t f = 0; f < count; ++f) {
+                const Triangle& t = triangles_[f];
+                const std::uint64_t b[3] = {t[0] / wide, t[1] / wide, t[2] / wide};
+                ++faces_of[b[0]];
+                if (b[1] != b[0]) ++faces_of[b[1]];
+                if (b[2] != b[0] && b[2] != b[1]) ++faces_of[b[2]];
+            }
+        });
+        std::vector<Range> ranges{{0, 0, 0}};
+        for (std::uint64_t b = 0; b * wide < mesh_.vertices(); ++b) {
+            if (faces_of[b] > most)
+                throw NumericalError(
+                    "the mesh does not fit into the memory that may be taken, nor parts of it");
+            const auto first = static_cast<VertexId>(b * wide);
+            if (ranges.back().faces + faces_of[b] > most) ranges.push_back({first, first, 0});
+            ranges.back().last = static_cast<VertexId>(std::min(mesh_.vertices(), first + wide));
+            ranges.back().faces += faces_of[b];
+        }
+        return ranges;
+    }
+    /// The faces that touch a range, in a mesh of their own: its vertices are in the order of the whole.
+    void add_range(const Range& range, double until, Counts& counts) {
+        std::vector<Triangle> touching;
+        touching.reserve(range.faces);
+        for_batches(until, [&](std::size_t count) {
+            for (std::size_t f = 0; f < count; ++f) {
+                const Triangle& t = triangles_[f];
+                if (std::any_of(t.begin(), t.end(),
+                                [&](VertexId v) { return v >= range.first && v < range.last; }))
+                    touching.push_back(t);
+            }
+        });
+        std::vector<VertexId> ids;
+        ids.reserve(3 * touching.size());
+        for (const Triangle& t : touching) ids.insert(ids.end(), t.begin(), t.end());
+        tbb::parallel_sort(ids.begin(), ids.end());
+        ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+        const auto place = [&](VertexId v) {
+            return static_cast<VertexId>(std::lower_bound(ids.begin(), ids.end(), v) - ids.begin());
+        };
+        TriMesh part;
+        part.points.resize(ids.size());
+        part.triangles.resize(touching.size());
+        parallel_for(touching.size(), 1024, [&](std::size_t f) {
+            for (std::size_t k = 0; k < 3; ++k) part.triangles[f][k] = place(touching[f][k]);
+        });
+        touching = {};
+        Counts here = count_stars(part, place(range.first), place(range.last));
+        for (BorderEnd& end : here.border) {
+            end.vertex = ids[end.vertex];
+            end.other = ids[end.other];
+        }
+        join_counts(counts, here);
+    }
+
+    const StoredMesh& mesh_;
+    std::uint64_t memory_;
+    const Progress& progress_;
+    std::vector<Triangle> triangles_;
+    std::vector<char> caps_;
+    std::uint64_t first_ = 0;
+    double done_ = 0;
+};
+
+}  // namespace
+
+MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress) {
+    check(mesh, "mesh");
+    MeshMeasures m;
+    m.vertices = mesh.points.size();
+    m.faces = mesh.triangles.size();
+    Pieces pieces(mesh.points.size());
+    for (const Triangle& t : mesh.triangles) pieces.add(t);
+    take_topology(count_stars(mesh, 0, mesh.points.size()), pieces, m);
+    progress.report(0.8);
+    if (m.faces == 0) return m;
+    const auto point = [&](VertexId v) -> const Vec3f& { return mesh.points[v]; };
+    Faces<decltype(point)> faces{mesh.triangles.data(), mesh.triangles.size(), point, {}};
+    if (const MeshProperty* caps = mesh.find_face_property(cap_property))
+        faces.cap = [caps](std::size_t f) {
+            return caps->values[f * static_cast<std::size_t>(caps->components)] > 0.5f;
+        };
+    const Vec3d centre =
+        sum_corners(faces, Vec3d(Vec3d::Zero())) / (3 * static_cast<double>(mesh.triangles.size()));
+    take_sums(sum_faces(faces, centre, Sums{}), m);
     progress.report(1);
     return m;
+}
+
+MeshMeasures measure_mesh(const StoredMesh& mesh, std::uint64_t memory, const Progress& progress) {
+    return StoredMeasure(mesh, memory, progress).run();
 }
 
 }  // namespace vdbgeo

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "vdbgeo/core/progress.h"
+#include "vdbgeo/core/stored_mesh.h"
 #include "vdbgeo/core/tri_mesh.h"
 
 namespace vdbgeo {
@@ -63,5 +64,10 @@ struct MeshMeasures {
 /// Throws InvalidInput for a mesh that check() refuses, and for 2^32 faces or more. Cost: O(n), parallel, and
 /// 20 bytes a face.
 MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress = {});
+
+/// The same numbers, to the bit, of a mesh that does not fit into memory. Its faces are gone through four
+/// times, and once for each range of vertices whose faces, 80 bytes each, fit into what is left of `memory`
+/// beside 4 bytes for each vertex and 50 MB for faces on their way. NumericalError where nothing fits.
+MeshMeasures measure_mesh(const StoredMesh& mesh, std::uint64_t memory, const Progress& progress = {});
 
 }  // namespace vdbgeo

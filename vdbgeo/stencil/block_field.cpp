@@ -192,13 +192,15 @@ std::uint64_t hash_of_bricks(const BlockLayout& layout, const float* bricks) {
         std::uint64_t value = 0;
         void add(const Sum& other) { value += other.value; }
     };
-    return sum_of_bricks<Sum>(layout, [&](std::size_t brick, Sum& sum) {
-               const openvdb::Coord& at = layout.origin(brick);
-               const std::uint64_t place = hash_of(&at, sizeof at, 0);
-               sum.value +=
-                   hash_of(bricks + brick * BlockField::brick_size, BlockField::brick_size * sizeof(float),
-                           hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
-           })
+    return sum_of_bricks<Sum>(layout,
+                              [&](std::size_t brick, Sum& sum) {
+                                  const openvdb::Coord& at = layout.origin(brick);
+                                  const std::uint64_t place = hash_of(&at, sizeof at, 0);
+                                  sum.value +=
+                                      hash_of(bricks + brick * BlockField::brick_size,
+                                              BlockField::brick_size * sizeof(float),
+                                              hash_of(&layout.mask(brick), sizeof(BlockLayout::Mask), place));
+                              })
         .value;
 }
 

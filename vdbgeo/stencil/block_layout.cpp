@@ -95,10 +95,12 @@ std::uint64_t BlockLayout::active_count() const {
         std::uint64_t voxels = 0;
         void add(const Count& other) { voxels += other.voxels; }
     };
-    return sum_of_bricks<Count>(*this, [&](std::size_t brick, Count& count) {
-               for (const std::uint64_t word : masks_[brick])
-                   count.voxels += static_cast<std::uint64_t>(__builtin_popcountll(word));
-           })
+    return sum_of_bricks<Count>(*this,
+                                [&](std::size_t brick, Count& count) {
+                                    for (const std::uint64_t word : masks_[brick])
+                                        count.voxels +=
+                                            static_cast<std::uint64_t>(__builtin_popcountll(word));
+                                })
         .voxels;
 }
 

@@ -58,8 +58,8 @@ class BlockLayout {
         Mask mask;
     };
     explicit BlockLayout(std::vector<LeafMask> leaves, const std::optional<openvdb::CoordBBox>& own = {});
-    /// From now on operators work on the voxels in this box; what they leave in the rest of the leaves that it
-    /// cuts is not told. Sums are over the leaves that begin in it.
+    /// From now on operators work on the voxels in this box; what they leave in the rest of the leaves that
+    /// it cuts is not told. Sums are over the leaves that begin in it.
     void work_on(const openvdb::CoordBBox& box);
     bool works_on(std::size_t brick) const { return work_.isInside(origins_[brick]); }
     /// What of a cell is worked on.

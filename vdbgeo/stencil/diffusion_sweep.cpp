@@ -70,7 +70,8 @@ class Sweep {
     void step(int k, int x, int margin, std::size_t field, Scratch& s) const;
     void scatter(TileGather& tile, int x, Scratch& s) const;
     PlaneRange range(int x, int margin, Scratch& s) const {
-        return {s.first_row + margin, s.last_row - margin, stride_, spans(x, s), spans(x - 1, s), spans(x + 1, s)};
+        return {s.first_row + margin, s.last_row - margin, stride_,
+                spans(x, s),          spans(x - 1, s),     spans(x + 1, s)};
     }
     RowSpan* spans(int x, Scratch& s) const {
         return s.spans.data() + ((x % planes_ + planes_) % planes_) * rows_;

@@ -10,8 +10,9 @@
 
 namespace vdbgeo::stencil {
 
-/// The leaves of a grid are shared out along y and z: each member has a box of them, and all along x. Its grid holds the leaves of its own box, and of the others' those that reach into
-/// `halo` voxels around it: the ghosts, which the members keep up to date for each other.
+/// The leaves of a grid are shared out along y and z: each member has a box of them, and all along x. Its
+/// grid holds the leaves of its own box, and of the others' those that reach into `halo` voxels around it:
+/// the ghosts, which the members keep up to date for each other.
 struct Share {
     Team* team = nullptr;
     /// By rank. In voxels, ends included, at multiples of 8 along y and of the size of a BlockLayout's cells

@@ -50,8 +50,9 @@ class TileGather {
  private:
     static constexpr int most = 4;  // leaves of the widest halo
     struct Part {                   // what of the leaves in one line of y or z belongs to the tile
-        int leaf, from, to, at;     // leaf number from the cell's first; voxels [from, to) of it; place in the plane
-        bool own;                   // some of it is worked on
+        int leaf, from, to,
+            at;    // leaf number from the cell's first; voxels [from, to) of it; place in the plane
+        bool own;  // some of it is worked on
     };
     static int parts(int begin, int end, int halo, int lead, Part* out);
     void find_spans(RowSpan* rows) const;

@@ -131,10 +131,17 @@ TEST_F(Mpi, ExtractsTheSameSurface) {
 }
 
 TEST_F(Mpi, AModelHasTheSameFiles) {
-    const std::string map = phantom("t.mrc", 64, {"--snr", "1"}, "torus");
+    const std::string map = phantom("a.mrc", 64, {"--snr", "1"}, "atpase");
     const auto words = [&](const std::string& folder, const Words& more) {
-        Words all{"model", map,       "-o",     at(folder), "--width",  "200",   "--occlusion",
-                  "0",     "--quiet", "--json", "--preset", "tomogram", "--set", "denoise.order=1"};
+        Words all{"model",       map,
+                  "-o",          at(folder),
+                  "--iso",       "3sigma",
+                  "--preset",    "tomogram",
+                  "--set",       "denoise.order=1",
+                  "--set",       "surface.cap=false",
+                  "--width",     "200",
+                  "--occlusion", "0",
+                  "--json",      "--quiet"};
         all.insert(all.end(), more.begin(), more.end());
         return all;
     };
@@ -145,8 +152,9 @@ TEST_F(Mpi, AModelHasTheSameFiles) {
     ASSERT_TRUE(summary.is_object()) << r.out;
     EXPECT_EQ(summary["status"], "done");
     for (const Json& stage : summary["stages"])
-        if (stage["name"] == "denoise" || stage["name"] == "surface")
+        if (stage["name"] == "denoise" || stage["name"] == "surface") {
             EXPECT_EQ(stage["result"]["members"], 2) << stage["name"];
+        }
     for (const char* name : {"density.vdb", "smooth.vdb", "surface.ply", "mesh.ply", "curved.ply",
                              "pockets.csv", "tets.vtu", "map.png", "mean.png", "angles.svg"})
         EXPECT_TRUE(bytes(std::string("one/") + name) == bytes(std::string("two/") + name)) << name;

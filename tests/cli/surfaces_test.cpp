@@ -270,7 +270,9 @@ TEST_F(Surfaces, MeasuresOfAMeshLargerThanMemory) {
     Json parts = Json::parse(r.out, nullptr, false);
     parts["seconds"] = whole["seconds"];
     EXPECT_EQ(parts, whole);
-    if (!sanitized) EXPECT_LT(r.peak_bytes, std::uint64_t(150) << 20);
+    if (!sanitized) {
+        EXPECT_LT(r.peak_bytes, std::uint64_t(150) << 20);
+    }
     expect_error(vdbgeo({"measure", at("n.ply"), "--memory", "40M", "--quiet"}), 5, at("n.ply"),
                  "does not fit");
     expect_error(vdbgeo({"measure", at("n.ply"), "--memory", "much"}), 2, "--memory");

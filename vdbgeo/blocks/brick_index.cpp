@@ -15,7 +15,8 @@ using stencil::BlockField;
 using stencil::BlockLayout;
 
 constexpr std::size_t brick_bytes = BlockField::brick_size * sizeof(float);
-constexpr std::size_t most_in_run = 512;  // a megabyte: enough for a disk, and many of them for many threads
+constexpr std::size_t chunk = 512;  // bricks: a megabyte, enough for a disk, and many of them for many threads
+constexpr std::size_t files = 8;    // which have the chunks in turn
 
 auto key(const Coord& cell) { return std::make_tuple(cell.y(), cell.z(), cell.x()); }
 
@@ -77,7 +78,7 @@ namespace {
 void add_brick(std::uint64_t brick, std::size_t at, std::vector<BrickIndex::Run>& runs) {
     if (!runs.empty()) {
         BrickIndex::Run& last = runs.back();
-        if (last.first + last.count == brick && last.at + last.count == at && last.count < most_in_run) {
+        if (last.first + last.count == brick && last.at + last.count == at && brick % chunk != 0) {
             ++last.count;
             return;
         }
@@ -118,18 +119,34 @@ std::vector<BrickIndex::Run> BrickIndex::within(const Part& part, const CoordBBo
     return out;
 }
 
+BrickFile::BrickFile(const std::filesystem::path& folder) {
+    for (std::size_t i = 0; i < files; ++i) files_.push_back(std::make_unique<ScratchFile>(folder));
+}
+
+namespace {
+
+std::size_t file_of(std::uint64_t brick) { return brick / chunk % files; }
+std::uint64_t place_in_file(std::uint64_t brick) {
+    return (brick / chunk / files * chunk + brick % chunk) * brick_bytes;
+}
+
+}  // namespace
+
 void BrickFile::read(const std::vector<BrickIndex::Run>& runs, float* field) const {
     parallel_for(runs.size(), 1, [&](std::size_t i) {
-        file_.read(runs[i].first * brick_bytes, field + runs[i].at * BlockField::brick_size,
-                   runs[i].count * brick_bytes);
+        const BrickIndex::Run& run = runs[i];
+        files_[file_of(run.first)]->read(place_in_file(run.first), field + run.at * BlockField::brick_size,
+                                         run.count * brick_bytes);
     });
 }
 
 void BrickFile::write(const std::vector<BrickIndex::Run>& runs, const float* field) {
-    // By one thread: a file system lets but one write to a file, and others would wait in turn.
-    for (const BrickIndex::Run& run : runs)
-        file_.write(run.first * brick_bytes, field + run.at * BlockField::brick_size,
-                    run.count * brick_bytes);
+    parallel_for(files, 1, [&](std::size_t file) {
+        for (const BrickIndex::Run& run : runs)
+            if (file_of(run.first) == file)
+                files_[file]->write(place_in_file(run.first), field + run.at * BlockField::brick_size,
+                                    run.count * brick_bytes);
+    });
 }
 
 }  // namespace vdbgeo

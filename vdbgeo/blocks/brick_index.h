@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "vdbgeo/core/scratch_file.h"
@@ -54,16 +56,17 @@ class BrickIndex {
     std::uint64_t bricks_ = 0;
 };
 
-/// A field of a map in a file without a name: a brick for each of an index.
+/// A field of a map in files without names: a brick for each of an index. They are several, since a file
+/// system lets but one thread write to a file.
 class BrickFile {
  public:
-    explicit BrickFile(const std::filesystem::path& folder) : file_(folder) {}
+    explicit BrickFile(const std::filesystem::path& folder);
     /// `field` has the bricks of a part's layout.
     void read(const std::vector<BrickIndex::Run>& runs, float* field) const;
     void write(const std::vector<BrickIndex::Run>& runs, const float* field);
 
  private:
-    ScratchFile file_;
+    std::vector<std::unique_ptr<ScratchFile>> files_;
 };
 
 }  // namespace vdbgeo

@@ -179,6 +179,9 @@ void say_outcome(const Outcome& outcome, const Json& j, double rms_before, Sessi
 void check_for_team(const DenoiseOptions& o, Session& session) {
     check_team_output(o.files, session);
     if (!o.diffuses()) throw UsageError(fmt::format("--method {}: a team runs hyperdiffusion", o.method));
+    if (o.diffusion.options.stepper == Stepper::adi)
+        throw UsageError(
+            "--stepper adi: its lines run through the whole map; a team takes steps (euler, fsi)");
     for (const auto& [flag, value] : {std::pair("--spectra", o.spectra), {"--slices", o.slices}})
         if (!value.empty()) throw UsageError(fmt::format("{}: a team draws no pictures", flag));
 }

@@ -31,7 +31,9 @@ struct MeasureOptions {
 /// The mesh, to be looked up in its file, where it would not fit into memory; null where it is to be read.
 std::unique_ptr<StoredMesh> too_large(const std::string& file, const MeasureOptions& o) {
     constexpr double bytes_a_face = 50, bytes_a_vertex = 40;
-    if (!has_ending(file, ".ply") || !o.distance.empty()) return nullptr;
+    std::error_code error;
+    if (!has_ending(file, ".ply") || !o.distance.empty() || !std::filesystem::is_regular_file(file, error))
+        return nullptr;
     auto stored = stored_ply(file);
     if (!stored) return nullptr;
     const double all = bytes_a_face * double(stored->faces()) + bytes_a_vertex * double(stored->vertices());

@@ -61,6 +61,7 @@ class ModelRun {
     void taken_over(const ModelStage& stage, const Json& old);
     void taken_as_it_is(const ModelStage& stage);
     void run_stage(const ModelStage& stage, const ModelStage::Lines& lines, const std::string& key);
+    void remove_stale_files(const ModelStage& stage) const;
     void give_up(const ModelStage& stage);
     std::optional<std::string> missing_input(const ModelStage& stage) const;
     void tell(const std::vector<std::string>& warnings);
@@ -163,6 +164,22 @@ void ModelRun::taken_as_it_is(const ModelStage& stage) {
     keep({{"name", stage.name}, {"title", stage.title}, {"status", "reused"}});
 }
 
+/// What an earlier run left of a stage and this one has not made: the report would show it as this one's.
+void ModelRun::remove_stale_files(const ModelStage& stage) const {
+    const Json* old = old_entry(stage.name);
+    if (!old) return;
+    const ModelStage::Names made = stage.outputs(state_);
+    for (const Json& file : old->value("files", Json::array())) {
+        const Json told = file.is_object() ? file.value("name", Json()) : Json();
+        const std::string name = told.is_string() ? told.get<std::string>() : "";
+        const bool plain = !name.empty() && fs::path(name).filename() == name;  // summaries can be edited
+        std::error_code error;
+        if (plain && std::find(made.begin(), made.end(), name) == made.end() &&
+            fs::is_regular_file(state_.at(name), error))
+            fs::remove(state_.at(name), error);
+    }
+}
+
 /// Later stages do without what this one should have left.
 void ModelRun::give_up(const ModelStage& stage) {
     failures_.push_back(stage.name);
@@ -254,6 +271,7 @@ void ModelRun::run_stage(const ModelStage& stage, const ModelStage::Lines& lines
         return;
     }
     entry["seconds"] = clock.seconds();
+    remove_stale_files(stage);
     Json files = Json::array();
     for (const std::string& name : stage.outputs(state_)) {
         hashes_.erase(name);

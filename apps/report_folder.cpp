@@ -111,6 +111,12 @@ RunStage stage_of(const Json& json) {
     if (warnings != json.end() && warnings->is_array())
         for (const Json& w : *warnings)
             if (w.is_string()) stage.warnings.push_back(w.get<std::string>());
+    const auto files = json.find("files");
+    if (files != json.end() && files->is_array()) {
+        stage.files.emplace();
+        for (const Json& file : *files)
+            if (file.is_object()) stage.files->push_back(text_of(file, "name"));
+    }
     const auto result = json.find("result");
     stage.result = result != json.end() && result->is_object() ? *result : Json::object();
     return stage;
@@ -294,7 +300,9 @@ PageTerms ReportFolder::missing_files() const {
                 const RunStage* s = stage(name);
                 return s && s->done();
             });
-        if (due) names += (names.empty() ? "" : ", ") + std::string(e.file);
+        const RunStage* maker = stage(e.stages[0]);
+        if (due && (!maker || maker->left(e.file)))
+            names += (names.empty() ? "" : ", ") + std::string(e.file);
     }
     if (names.empty()) return {};
     return {{"Files", "Not in the folder: " + names + "."}};

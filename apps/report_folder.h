@@ -1,6 +1,7 @@
 // The folder of a model run, read with distrust: anything in it may be missing, damaged or of another make.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -18,9 +19,14 @@ struct RunStage {
     std::string name, title, status, error, command;
     std::optional<double> seconds;
     std::vector<std::string> warnings;
-    Json result;  ///< an object; empty where there is none
+    std::optional<std::vector<std::string>> files;  ///< that it left, where the summary lists them
+    Json result;                                    ///< an object; empty where there is none
 
     bool done() const { return status == "done" || status == "reused"; }
+    /// False where the summary says that it made no such file.
+    bool left(const std::string& file) const {
+        return !files || std::find(files->begin(), files->end(), file) != files->end();
+    }
 };
 
 /// One row of a table of pockets: numbers by the names of the columns.

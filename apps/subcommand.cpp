@@ -28,16 +28,22 @@ Command find_command(const std::string& name) {
     throw UsageError(fmt::format("there is no command {}", name));
 }
 
-void check_words(const std::vector<std::string>& words, Team* team) {
+void rehearse(const std::vector<std::string>& words, Team* team) {
     CLI::App app;
     const auto body = parse(app, words);
     Session session = Session::rehearsal();
     session.team = team;
     try {
         body(session);
+    } catch (const Session::Rehearsed&) {
+    }
+}
+
+void check_words(const std::vector<std::string>& words) {
+    try {
+        rehearse(words);
     } catch (const UsageError&) {
         throw;
-    } catch (const Session::Rehearsed&) {
     } catch (const std::exception&) {  // a file that an earlier stage is still to write
     }
 }

@@ -12,10 +12,13 @@ namespace vdbgeo::app {
 /// The command of that name.
 Command find_command(const std::string& name);
 
-/// UsageError unless the command `words[0]` takes the other words and finds sense in them. Reads no file that
-/// is not named as an option's value, and writes none.
-/// `team`: as its members would.
-void check_words(const std::vector<std::string>& words, Team* team = nullptr);
+/// Runs a command line as far as its first stage: what it throws until then is thrown. Reads headers of files
+/// at most, and writes none. `team`: as its members would.
+void rehearse(const std::vector<std::string>& words, Team* team = nullptr);
+
+/// UsageError unless the command `words[0]` takes the other words and finds sense in them. Its input need not
+/// be there yet.
+void check_words(const std::vector<std::string>& words);
 
 /// Runs a command line in this process and returns its result and its warnings. It throws what the command
 /// throws. `name` is shown with its progress. `team`: it is run by all its members, which call this alike.

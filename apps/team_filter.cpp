@@ -29,8 +29,6 @@ fs::path folder_of_parts(const std::string& out) {
 
 }  // namespace
 
-void wait_for_all(Team& team) { gather_all(team, std::vector<char>{}); }
-
 MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session) {
     Team& team = *session.team;
     const openvdb::CoordBBox box = box_of(map_frame(in, options));

@@ -20,8 +20,6 @@ struct MapOfTeam {
 /// Shares out the map among the session's team and reads this member's part, with ghosts `halo` voxels wide.
 /// Says what is odd about it.
 MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session);
-/// Returns once all members have come here.
-void wait_for_all(Team& team);
 
 /// A map that is to become another: whole, or a member's part where a team runs the command.
 struct FilterInput {

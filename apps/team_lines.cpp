@@ -17,32 +17,42 @@ struct Word {
     Words line;
     std::string name, usage_error;
 
-    std::string text() const {
-        return Json{{"end", end}, {"line", line}, {"name", name}, {"usage_error", usage_error}}.dump(
-            -1, ' ', false, Json::error_handler_t::replace);
+    /// Words as they are, each with its length before it: names of files can hold any bytes.
+    std::vector<char> bytes() const {
+        std::string text(1, end ? '1' : '0');
+        const auto add = [&](const std::string& word) { text += std::to_string(word.size()) + ':' + word; };
+        add(name);
+        add(usage_error);
+        for (const std::string& word : line) add(word);
+        return {text.begin(), text.end()};
     }
-    static Word parse(const std::string& text) {
-        const Json j = Json::parse(text);
-        return {j["end"].get<bool>(), j["line"].get<Words>(), j["name"].get<std::string>(),
-                j["usage_error"].get<std::string>()};
+    static Word parse(const std::vector<char>& bytes) {
+        const std::string text(bytes.begin(), bytes.end());
+        Words words;
+        for (std::size_t at = 1; at < text.size();) {
+            const std::size_t begin = text.find(':', at) + 1, length = std::stoul(text.substr(at));
+            words.push_back(text.substr(begin, length));
+            at = begin + length;
+        }
+        return {text[0] == '1', Words(words.begin() + 2, words.end()), words[0], words[1]};
     }
 };
 
 /// The first says it, and all know.
 Word pass_on(Team& team, const Word& word) {
     team.rest_until_all_come();
-    const std::string text = team.rank() == 0 ? word.text() : "";
-    const auto all = team.gather({text.begin(), text.end()});
-    return Word::parse({all[0].begin(), all[0].end()});
+    const auto all = team.gather(team.rank() == 0 ? word.bytes() : std::vector<char>());
+    return Word::parse(all[0]);
 }
 
-/// By the command's own word, on its command line alone.
+/// By the command's own word, on its command line and its input's header. What it finds wrong may be wrong
+/// for a team only, such as more members than a small map has units: then the first runs it alone.
 bool can_be_shared(const Words& words, Team& team) {
     if (words[0] != "denoise" && words[0] != "surface") return false;
     try {
-        check_words(words, &team);
+        rehearse(words, &team);
         return true;
-    } catch (const UsageError&) {
+    } catch (const std::exception&) {
         return false;
     }
 }

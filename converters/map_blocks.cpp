@@ -1,11 +1,15 @@
 #include "converters/map_blocks.h"
 
+#include <fmt/format.h>
+
 #include <limits>
 #include <vector>
 
 #include "converters/map_box.h"
 #include "converters/map_parts.h"
 #include "converters/vdb_sections.h"
+#include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_part.h"
 #include "vdbgeo/volume/noted_statistics.h"
 #include "vdbgeo/volume/placement.h"
 
@@ -102,7 +106,10 @@ class MapBlocks::VdbSource : public Source {
         whole = map_of_vdb(grid, path, options);
         const std::vector<CoordBBox> pieces = leaves_.pieces();
         for (const CoordBBox& piece : pieces) box.expand(piece);
-        if (whole.map.frame.bounded()) take_box_of_frame();
+        if (whole.map.frame.bounded()) {
+            take_box_of_frame();
+            check_active_box(path);
+        }
         if (!noted) whole.map.statistics = statistics_of(pieces, progress);
     }
 
@@ -116,6 +123,16 @@ class MapBlocks::VdbSource : public Source {
     std::uint64_t memory() const override { return leaves_.memory(); }
 
  private:
+    /// Parts are those of the box: nothing may lie outside.
+    void check_active_box(const fs::path& path) const {
+        const CoordBBox& active = leaves_.active_box();
+        if (active.empty() || whole_leaves(box).isInside(active)) return;
+        const Vec3i& size = whole.map.frame.size;
+        throw InvalidInput(
+            fmt::format("{}: the grid has active voxels outside its box of {} x {} x {}, which cannot be "
+                        "done part by part",
+                        path.string(), size.x(), size.y(), size.z()));
+    }
     /// As map_from_grid finds them.
     Statistics statistics_of(const std::vector<CoordBBox>& pieces, const Progress& progress) {
         ActiveStatistics all;

@@ -148,6 +148,7 @@ MapParts::MapParts(MapParts&&) noexcept = default;
 
 const Frame& MapParts::frame() const { return state_->parts[0].frame(); }
 std::uint64_t MapParts::active_voxels() const { return state_->active_voxels; }
+const CoordBBox& MapParts::active_box() const { return state_->active_box; }
 std::size_t MapParts::parts() const { return state_->parts.size(); }
 
 std::uint64_t MapParts::memory() const {

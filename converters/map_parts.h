@@ -37,6 +37,7 @@ class MapParts {
 
     const Frame& frame() const;
     std::uint64_t active_voxels() const;
+    const openvdb::CoordBBox& active_box() const;
     std::size_t parts() const;
     /// Bytes that the notes on all parts take.
     std::uint64_t memory() const;

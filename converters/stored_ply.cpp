@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "converters/mapped_file.h"
@@ -41,7 +42,8 @@ const PlyProperty* property_of(const PlyElement& element, const char* name) {
 
 class StoredPly : public StoredMesh {
  public:
-    StoredPly(const std::filesystem::path& path, bool& fits) : file_(path), header_(mesh_formats::read_ply_header(file_)) {
+    StoredPly(const std::filesystem::path& path, bool& fits)
+        : file_(path), header_(mesh_formats::read_ply_header(file_)) {
         fits = find_places();
     }
 

@@ -7,6 +7,7 @@
 
 #include "tests/support/grids.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {

@@ -12,6 +12,7 @@
 #include "vdbgeo/core/errors.h"
 #include "vdbgeo/flow/diffusion_solver.h"
 #include "vdbgeo/flow/hyperdiffusion.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {

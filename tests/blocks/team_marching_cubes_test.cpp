@@ -15,6 +15,7 @@
 #include "tests/support/thread_team.h"
 #include "vdbgeo/blocks/partition.h"
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/volume/grid_part.h"
 
 namespace vdbgeo {
 namespace {

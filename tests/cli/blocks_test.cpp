@@ -34,7 +34,9 @@ class Blocks : public Cli {
                                 "max", "mean", "rms", "active_voxels"})
             EXPECT_EQ(blocks.value(key, Json()), whole.value(key, Json())) << key;
         EXPECT_TRUE(bytes("one" + ending) == bytes("many" + ending));
-        if (!sanitized) EXPECT_LT(r.peak_bytes, std::uint64_t(256) << 20);
+        if (!sanitized) {
+            EXPECT_LT(r.peak_bytes, std::uint64_t(256) << 20);
+        }
     }
 };
 

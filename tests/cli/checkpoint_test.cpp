@@ -65,7 +65,9 @@ TEST_F(Checkpoints, KilledAtAnyMomentItGoesOn) {
             std::chrono::milliseconds(static_cast<int>(1000 * all * ((i * 7 + 3) % 20) / 20));
         const Ended r = vdbgeo(words("b.mrc", {"--checkpoint", at("c"), "--resume"}), options);
         killed += r.killed == SIGKILL;
-        if (fs::exists(at("b.mrc"))) EXPECT_TRUE(bytes("b.mrc") == whole);
+        if (fs::exists(at("b.mrc"))) {
+            EXPECT_TRUE(bytes("b.mrc") == whole);
+        }
         if (i % 2) continue;  // some are killed twice before they go on
         const Ended end = good(resuming("b.mrc"));
         const Json told = Json::parse(end.out, nullptr, false);
@@ -147,7 +149,9 @@ TEST_F(MpiCheckpoints, AProcessThatIsKilledTakesAllDownAndTheRestGoesOnWithFewer
                               "p) 2>/dev/null; wait $p");
         killed += r.code != 0;
         // Killed behind its last step, it is there and whole.
-        if (fs::exists(at("b.mrc"))) EXPECT_TRUE(bytes("b.mrc") == whole);
+        if (fs::exists(at("b.mrc"))) {
+            EXPECT_TRUE(bytes("b.mrc") == whole);
+        }
         if (i % 2) continue;
         if (i % 4)
             good(resuming("b.mrc"));

@@ -160,6 +160,12 @@ TEST_F(Mpi, AModelHasTheSameFiles) {
         EXPECT_TRUE(bytes(std::string("one/") + name) == bytes(std::string("two/") + name)) << name;
     EXPECT_FALSE(std::filesystem::exists(at("two/spectra.svg")));
     EXPECT_TRUE(std::filesystem::exists(at("two/report.html")));
+    EXPECT_EQ(bytes("two/report.html").find("Not in the folder"), std::string::npos);
+    // What an earlier run left, and this one does not make, goes.
+    EXPECT_TRUE(std::filesystem::exists(at("one/spectra.svg")));
+    ASSERT_EQ(mpi(2, words("one", {"--to", "denoise"})).code, 0);
+    EXPECT_FALSE(std::filesystem::exists(at("one/spectra.svg")));
+    EXPECT_FALSE(std::filesystem::exists(at("one/slices_after_x.png")));
     // What the first alone finds wrong ends all.
     const Ended usage = mpi(2, words("two", {"--from", "tets", "--to", "map"}));
     EXPECT_EQ(usage.code, 2);
@@ -167,6 +173,25 @@ TEST_F(Mpi, AModelHasTheSameFiles) {
     const Ended missing = mpi(2, {"model", at("none.mrc"), "-o", at("three"), "--quiet"});
     EXPECT_EQ(missing.code, 4);
     EXPECT_NE(missing.err.find("none.mrc"), std::string::npos) << missing.err;
+}
+
+TEST_F(Mpi, OfAModelWhatATeamCannotRunIsRunByTheFirst) {
+    const auto model = [&](int processes, const std::string& map, const std::string& folder,
+                           const std::string& setting) {
+        const Ended r = mpi(processes, {"model", map, "-o", at(folder), "--iso", "3sigma", "--to", "surface",
+                                        "--set", setting, "--json", "--quiet"});
+        ASSERT_EQ(r.code, 0) << r.err;
+        const Json summary = Json::parse(r.out, nullptr, false);
+        ASSERT_TRUE(summary.is_object()) << r.out;
+        for (const Json& stage : summary["stages"]) {
+            EXPECT_TRUE(stage["status"] == "done" || stage["status"] == "earlier") << stage;
+            if (stage["name"] == "denoise") {
+                EXPECT_FALSE(stage["result"].contains("members"));
+            }
+        }
+    };
+    model(2, phantom("a.mrc", 48, {"--snr", "1"}, "atpase"), "adi", "denoise.stepper=adi");
+    model(3, phantom("b.mrc", 16, {"--snr", "1"}), "f\xFFw", "denoise.order=1");  // three, and two units
 }
 
 TEST_F(Mpi, AnErrorIsOneLineAndItsExitCode) {

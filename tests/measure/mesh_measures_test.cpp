@@ -75,6 +75,19 @@ void expect_same(const MeshMeasures& a, const MeshMeasures& b) {
 /// What is held beside the faces of a range.
 std::uint64_t held(const TriMesh& mesh) { return 4 * mesh.points.size() + 50000000; }
 
+/// Triangles that do not touch.
+TriMesh soup(int count) {
+    std::vector<Vec3f> points;
+    std::vector<Triangle> triangles;
+    for (int i = 0; i < count; ++i) {
+        const auto v = static_cast<VertexId>(points.size());
+        for (const Vec3f& p : {Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0)})
+            points.push_back(p + Vec3f(0, 0, static_cast<float>(i)));
+        triangles.push_back({v, v + 1, v + 2});
+    }
+    return mesh_of(points, triangles);
+}
+
 /// A patch of a lattice of n × n points, and faces at random: open, not manifold, turned, twice there,
 /// without area, with corners far apart; some are caps.
 TriMesh messy(int n, int more) {
@@ -117,7 +130,9 @@ TEST(StoredMeshMeasures, AreThoseOfTheMeshInMemory) {
         for (const std::uint64_t faces : {std::uint64_t(60), std::uint64_t(3000), std::uint64_t(1000000)}) {
             SCOPED_TRACE(std::to_string(mesh.triangles.size()) + " faces, " + std::to_string(faces) +
                          " in a range");
-            expect_same(measure_mesh(LookedUp(mesh), held(mesh) + 80 * faces), measure_mesh(mesh));
+            const MeshMeasures m = measure_mesh(mesh);
+            const std::uint64_t borders = 4 * 72 * m.boundary_edges;
+            expect_same(measure_mesh(LookedUp(mesh), held(mesh) + borders + 120 * faces), m);
         }
     const MeshMeasures m = measure_mesh(messy(30, 40));
     EXPECT_TRUE(m.holes > 1 && m.duplicate_faces > 0 && m.non_manifold_edges > 0 &&
@@ -129,6 +144,9 @@ TEST(StoredMeshMeasures, OfWhatDoesNotFitAreRefused) {
     const TriMesh mesh = messy(30, 0);
     EXPECT_THROW(measure_mesh(LookedUp(mesh), held(mesh) + 80), NumericalError);
     EXPECT_THROW(measure_mesh(LookedUp(mesh), 0), NumericalError);
+    const TriMesh apart = soup(100);
+    EXPECT_THROW(measure_mesh(LookedUp(apart), held(apart) + 4 * 72 * 299), NumericalError);
+    EXPECT_EQ(measure_mesh(LookedUp(apart), held(apart) + 4 * 72 * 300).holes, 100u);
     TriMesh odd = mesh;
     odd.triangles[100][1] = 5000;
     EXPECT_THROW(measure_mesh(LookedUp(odd), held(odd) + 1000000), InvalidInput);

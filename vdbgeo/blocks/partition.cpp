@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "vdbgeo/core/errors.h"
+#include "vdbgeo/stencil/block_layout.h"
 #include "vdbgeo/volume/leaf_layout.h"
 
 namespace vdbgeo {

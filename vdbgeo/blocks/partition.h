@@ -1,4 +1,4 @@
-// How a grid is shared out: slabs along y, or pencils along x.
+// How a grid is shared out: slabs along y, or pencils that run along x.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -6,15 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "vdbgeo/core/team.h"
-#include "vdbgeo/stencil/share.h"
-#include "vdbgeo/volume/grid_part.h"
-
 namespace vdbgeo {
 
-/// Shares out a box of voxels, rounded to units of 8 voxels along y and 128 along z, and all of x: `parts[0]`
-/// ranges of units along y times `parts[1]` along z, each as long as the others or one unit longer. Parts are
-/// numbered with z fastest. InvalidInput where there are more parts along an axis than units.
+/// Shares out a box of voxels, rounded to units of 8 voxels along y and 128 along z, and all of x:
+/// `parts.first` ranges of units along y times `parts.second` along z, each as long as the others or one unit
+/// longer. Parts are numbered with z fastest. InvalidInput where there are more parts along an axis than
+/// units.
 std::vector<openvdb::CoordBBox> partition(const openvdb::CoordBBox& box, const std::pair<int, int>& parts);
 
 /// Parts along y and z for so many members: of all ways that have a unit for everybody, the one whose largest

@@ -59,9 +59,9 @@ class DiffusionFields {
 
     stencil::BlockLayout& layout() { return layout_; }
     const stencil::BlockLayout& layout() const { return layout_; }
-    /// Makes all values but those of `now` finite, and nothing flow: for blocks, where cells that nobody
-    /// needs are not computed, and what is read of them must not become an infinity. (`inactive` would:
-    /// kernels trust full leaves.)
+    /// Makes all values but those of `now` finite, and nothing flow: for blocks, where voxels that the layout
+    /// does not work on are not computed, and what is read of them must not become an infinity. (`inactive`
+    /// would: kernels trust full leaves.)
     void clear_rest();
     /// All fields, and the target of one, become X − offset.
     void load(const openvdb::FloatTree& x, float offset);
@@ -79,7 +79,7 @@ class DiffusionFields {
     /// Bricks of the coefficients that vary.
     std::vector<float*> coefficients();
 
-    /// Evaluates the coefficients in the layout's own cells.
+    /// Evaluates the coefficients in the voxels that the layout works on.
     void freeze(const EdgeMeasure& measure);
     stencil::SweepPlan plan(const CycleSweep& sweep);
     /// u += Π_a (I + θ τ A_a)^{-1} τ A u, where A is the whole operator and A_a = Σ_q L_{d,a} L_a^q.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "vdbgeo/core/disjoint_sets.h"
@@ -210,6 +211,8 @@ Counts count_stars(const TriMesh& mesh, std::size_t first, std::size_t last) {
 
 /// The ends come vertex by vertex. Those of one edge belong together, and those in one fan of a vertex.
 std::uint64_t count_loops(const std::vector<BorderEnd>& ends) {
+    if (ends.size() >= std::numeric_limits<std::uint32_t>::max())
+        throw NumericalError("the mesh has more border edges than can be counted, 2^31");
     DisjointSets loops(ends.size());
     std::vector<std::uint32_t> order(ends.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -303,15 +306,18 @@ class StoredMeasure {
         for_batches(0.2, [&](std::size_t count) { sums = sum_faces(faces(count), centre, sums); });
         mesh_.release();
         const std::uint64_t held = 4 * m.vertices + 50000000;
-        const std::uint64_t left = memory_ > held ? memory_ - held : 0;
+        if (memory_ <= held) throw does_not_fit();
+        const std::uint64_t left = memory_ - held;
         Pieces pieces(m.vertices);
         for_batches(0.3, [&](std::size_t count) {
             for (std::size_t f = 0; f < count; ++f) pieces.add(triangles_[f]);
         });
-        const std::vector<Range> ranges = ranges_of(left / bytes_a_face);
+        const std::vector<Range> ranges = ranges_of(left / 4 * 3 / bytes_a_face);
         Counts counts;
-        for (std::size_t r = 0; r < ranges.size(); ++r)
+        for (std::size_t r = 0; r < ranges.size(); ++r) {
             add_range(ranges[r], 0.4 + 0.6 * double(r + 1) / double(ranges.size()), counts);
+            if (counts.border.size() > left / 4 / bytes_an_end) throw does_not_fit();
+        }
         take_topology(counts, pieces, m);
         if (m.faces > 0) take_sums(sums, m);
         progress_.report(1);
@@ -321,7 +327,11 @@ class StoredMeasure {
  private:
     static constexpr std::size_t batch = 64 * block;  // faces
     static constexpr std::uint64_t bytes_a_face = 80;
+    static constexpr std::uint64_t bytes_an_end = 36;  // BorderEnd, of which a list that grows has three
 
+    static NumericalError does_not_fit() {
+        return NumericalError("the mesh does not fit into the memory that may be taken, nor parts of it");
+    }
     /// Vertices [first, last), and how many faces touch them at most.
     struct Range {
         VertexId first, last;
@@ -363,6 +373,7 @@ class StoredMeasure {
     }
     /// Ranges of vertices that at most so many faces touch.
     std::vector<Range> ranges_of(std::uint64_t most) {
+        most = std::min<std::uint64_t>(most, std::numeric_limits<std::uint32_t>::max() - 1);
         constexpr std::uint64_t bins = 1 << 16;
         const std::uint64_t wide = mesh_.vertices() / bins + 1;
         std::vector<std::uint64_t> faces_of(bins, 0);
@@ -377,9 +388,7 @@ class StoredMeasure {
         });
         std::vector<Range> ranges{{0, 0, 0}};
         for (std::uint64_t b = 0; b * wide < mesh_.vertices(); ++b) {
-            if (faces_of[b] > most)
-                throw NumericalError(
-                    "the mesh does not fit into the memory that may be taken, nor parts of it");
+            if (faces_of[b] > most) throw does_not_fit();
             const auto first = static_cast<VertexId>(b * wide);
             if (ranges.back().faces + faces_of[b] > most) ranges.push_back({first, first, 0});
             ranges.back().last = static_cast<VertexId>(std::min(mesh_.vertices(), first + wide));

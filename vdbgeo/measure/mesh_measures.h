@@ -66,8 +66,11 @@ struct MeshMeasures {
 MeshMeasures measure_mesh(const TriMesh& mesh, const Progress& progress = {});
 
 /// The same numbers, to the bit, of a mesh that does not fit into memory. Its faces are gone through four
-/// times, and once for each range of vertices whose faces, 80 bytes each, fit into what is left of `memory`
-/// beside 4 bytes for each vertex and 50 MB for faces on their way. NumericalError where nothing fits.
+/// times, and once for each range of vertices whose faces, 80 bytes each, fit into three quarters of what is
+/// left of `memory` beside 4 bytes for each vertex and 50 MB for faces on their way. The last quarter is for
+/// borders, 72 bytes an edge. NumericalError where this does not do. Pages of the points that the mesh looks
+/// up in a file come on top, for a million faces at a time: few where faces that follow each other are
+/// neighbours.
 MeshMeasures measure_mesh(const StoredMesh& mesh, std::uint64_t memory, const Progress& progress = {});
 
 }  // namespace vdbgeo

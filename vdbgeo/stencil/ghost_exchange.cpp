@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "vdbgeo/core/errors.h"
 #include "vdbgeo/core/parallel.h"
 #include "vdbgeo/stencil/block_field.h"
 
@@ -17,9 +18,10 @@ GhostExchange::GhostExchange(const BlockLayout& layout, const Share& share) : te
     std::vector<openvdb::CoordBBox> reach;
     for (int r = 0; r < team_.size(); ++r) reach.push_back(share.with_ghosts(r));
     const auto owner = [&](const openvdb::Coord& leaf) {
-        int r = 0;
-        while (!share.boxes[static_cast<std::size_t>(r)].isInside(leaf)) ++r;
-        return r;
+        const auto box = std::find_if(share.boxes.begin(), share.boxes.end(),
+                                      [&](const openvdb::CoordBBox& b) { return b.isInside(leaf); });
+        if (box == share.boxes.end()) throw InvalidInput("a leaf of the grid lies in no member's box");
+        return static_cast<int>(box - share.boxes.begin());
     };
     for (const BlockLayout::Slab& s : layout.slabs()) {
         Slab slab;

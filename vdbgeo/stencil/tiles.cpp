@@ -85,7 +85,8 @@ void run_tile(const BlockLayout& layout, std::int32_t cell, const Shape& s, cons
     for (float* out : t.out)
         for (int x = 0; x < BlockLayout::size_x; ++x) std::fill_n(out + x * s.plane - corner, s.plane, 0.0f);
     body(t);
-    for (int x = 0; x < BlockLayout::size_x; ++x) {
+    // Whole leaves that are worked on: behind them other boxes' values may lie, which stay.
+    for (int x = t.work.min().x() & ~7; x <= (t.work.max().x() | 7); ++x) {
         gather.move_to(t.origin.x() + x);
         for (std::size_t i = 0; i < f.out.size(); ++i)
             gather.scatter(t.out[i] + x * s.plane - corner, f.out[i]);

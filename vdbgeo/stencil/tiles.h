@@ -38,7 +38,7 @@ struct Tile {
 struct TileFields {
     std::vector<const float*> in;  ///< bricks
     std::vector<float*> out;       ///< bricks; another memory than `in`
-    int halo = 1;                  ///< 0…16
+    int halo = 1;                  ///< 0…BlockLayout::max_halo
     int scratch = 0;               ///< how many arrays to work in
     /// Only about one cell of so many, chosen by where they lie: a sample, where nothing is written.
     std::size_t every = 1;

@@ -178,7 +178,7 @@ TEST_F(Mpi, AModelHasTheSameFiles) {
 TEST_F(Mpi, OfAModelWhatATeamCannotRunIsRunByTheFirst) {
     const auto model = [&](int processes, const std::string& map, const std::string& folder,
                            const std::string& setting) {
-        const Ended r = mpi(processes, {"model", map, "-o", at(folder), "--iso", "3sigma", "--to", "surface",
+        const Ended r = mpi(processes, {"model", map, "-o", at(folder), "--iso", "0.5sigma", "--to", "surface",
                                         "--set", setting, "--json", "--quiet"});
         ASSERT_EQ(r.code, 0) << r.err;
         const Json summary = Json::parse(r.out, nullptr, false);

@@ -12,8 +12,8 @@ namespace vdbgeo::app {
 /// The command of that name.
 Command find_command(const std::string& name);
 
-/// Runs a command line as far as its first stage: what it throws until then is thrown. Reads headers of files
-/// at most, and writes none. `team`: as its members would.
+/// Runs a command line as far as its first stage: what it throws until then is thrown. Of a map it reads the
+/// header at most, or where leaves lie, and it writes nothing. `team`: as its members would.
 void rehearse(const std::vector<std::string>& words, Team* team = nullptr);
 
 /// UsageError unless the command `words[0]` takes the other words and finds sense in them. Its input need not

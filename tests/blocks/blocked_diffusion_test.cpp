@@ -61,10 +61,12 @@ class BlockedHyperdiffusion : public ::testing::TestWithParam<test::DiffusionSet
 };
 
 TEST_P(BlockedHyperdiffusion, HasTheBitsOfOneGrid) {
-    expect_same_bits(*test::noisy_map(), {{"pencils", Coord(128, 64, 128), 8, 0},
-                                          {"slabs of few steps", Coord(128, 32, 512), 4, 0},
-                                          {"by memory", {}, {}, 24000000},
-                                          {"large", {}, {}, 2000000000}});
+    std::vector<Shape> shapes{{"by memory", {}, {}, 24000000}};
+    if (GetParam().options.steps)  // the automatic time takes a hundred
+        shapes.insert(shapes.end(), {{"pencils", Coord(128, 64, 128), 8, 0},
+                                     {"slabs of few steps", Coord(128, 32, 512), 4, 0},
+                                     {"large", {}, {}, 2000000000}});
+    expect_same_bits(*test::noisy_map(), shapes);
 }
 
 TEST_P(BlockedHyperdiffusion, OfSingleCellsToo) {

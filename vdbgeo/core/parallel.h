@@ -34,6 +34,16 @@ class LoopFence {
 #endif
 };
 
+/// A thread's turn in a loop, which may end by an exception.
+class LoopTurn {
+ public:
+    explicit LoopTurn(LoopFence& fence) : fence_(fence) { fence_.enter(); }
+    ~LoopTurn() { fence_.leave(); }
+
+ private:
+    LoopFence& fence_;
+};
+
 }  // namespace detail
 
 /// Calls body(i) for i in [0, count), `grain` neighbours at a time to one thread.
@@ -41,9 +51,8 @@ template <class Body>
 void parallel_for(std::size_t count, std::size_t grain, const Body& body) {
     detail::LoopFence fence;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
-        fence.enter();
+        const detail::LoopTurn turn(fence);
         for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-        fence.leave();
     });
 }
 

@@ -82,6 +82,7 @@ BlockFilter::BlockFilter(const MapFilterFlags& flags, Session& session)
     if (!map_.frame().bounded())
         throw InvalidInput(flags.in +
                            ": the grid has no box, which blocks of it need; vdbgeo convert makes one");
+    map_.require_active_in_box();
     for (const std::string& w : in().warnings) session.warn(flags.in + ": " + w);
     if (!session.json && !session.quiet)
         for (const std::string& note : in().notes) session.say(flags.in + ": " + note);

@@ -227,7 +227,7 @@ void run_surface_by_team(const SurfaceOptions& o, Session& session) {
     Team& team = *session.team;
     Json seconds;
     Clock clock;
-    const MapOfTeam map = read_for_team(o.in, o.map.options, leaf::dim, session);
+    const MapOfTeam map = read_for_team(o.in, o.map.options, leaf::dim, true, session);
     seconds["read"] = clock.lap();
     const DensityMap& part = map.in.map;
     const TeamSurface surface = naming(o.in, [&] {

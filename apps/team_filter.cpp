@@ -29,12 +29,13 @@ fs::path folder_of_parts(const std::string& out) {
 
 }  // namespace
 
-MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session) {
+MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, bool box_only,
+                        Session& session) {
     Team& team = *session.team;
     const openvdb::CoordBBox box = box_of(map_frame(in, options));
     MapOfTeam map;
     map.share = {&team, partition(box, parts_for(box, team.size())), halo};
-    const MapPart part{&team, map.share.own(), map.share.with_ghosts(team.rank())};
+    const MapPart part{&team, map.share.own(), map.share.with_ghosts(team.rank()), box_only};
     map.in = read_map_part(in, options, part, session.stage("reading"));
     for (const std::string& w : map.in.warnings) session.warn(in + ": " + w);
     if (!session.json && !session.quiet)
@@ -45,7 +46,7 @@ MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, in
 FilterInput read_filter_input(const MapFilterFlags& flags, const MemoryNeed& need, int halo,
                               Session& session) {
     if (!session.team) return {read_for_filter(flags, need, session), {}};
-    MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, session);
+    MapOfTeam map = read_for_team(flags.in, flags.map.options, halo, false, session);
     FilterInput input{std::move(map.in), std::move(map.share)};
     need_samples(flags.in, active_moments(*input.in.map.grid, input.counted()), input.in.map.statistics);
     return input;

@@ -18,8 +18,9 @@ struct MapOfTeam {
 };
 
 /// Shares out the map among the session's team and reads this member's part, with ghosts `halo` voxels wide.
-/// Says what is odd about it.
-MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, Session& session);
+/// Says what is odd about it. `box_only` as in MapPart.
+MapOfTeam read_for_team(const std::string& in, const MapReadOptions& options, int halo, bool box_only,
+                        Session& session);
 
 /// A map that is to become another: whole, or a member's part where a team runs the command.
 struct FilterInput {

@@ -24,6 +24,7 @@ class MapBlocks::Source {
     virtual ~Source() = default;
     virtual openvdb::FloatGrid::Ptr read(const CoordBBox& wanted, const Progress& progress) = 0;
     virtual std::uint64_t memory() const = 0;
+    virtual bool has_active_beyond_box() const { return false; }
 
     MapFile whole;
     CoordBBox box;
@@ -106,10 +107,7 @@ class MapBlocks::VdbSource : public Source {
         whole = map_of_vdb(grid, path, options);
         const std::vector<CoordBBox> pieces = leaves_.pieces();
         for (const CoordBBox& piece : pieces) box.expand(piece);
-        if (whole.map.frame.bounded()) {
-            take_box_of_frame();
-            check_active_box(path);
-        }
+        if (whole.map.frame.bounded()) take_box_of_frame();
         if (!noted) whole.map.statistics = statistics_of(pieces, progress);
     }
 
@@ -122,17 +120,12 @@ class MapBlocks::VdbSource : public Source {
 
     std::uint64_t memory() const override { return leaves_.memory(); }
 
- private:
-    /// Parts are those of the box: nothing may lie outside.
-    void check_active_box(const fs::path& path) const {
+    bool has_active_beyond_box() const override {
         const CoordBBox& active = leaves_.active_box();
-        if (active.empty() || whole_leaves(box).isInside(active)) return;
-        const Vec3i& size = whole.map.frame.size;
-        throw InvalidInput(
-            fmt::format("{}: the grid has active voxels outside its box of {} x {} x {}, which cannot be "
-                        "done part by part",
-                        path.string(), size.x(), size.y(), size.z()));
+        return !active.empty() && !whole_leaves(box).isInside(active);
     }
+
+ private:
     /// As map_from_grid finds them.
     Statistics statistics_of(const std::vector<CoordBBox>& pieces, const Progress& progress) {
         ActiveStatistics all;
@@ -147,7 +140,8 @@ class MapBlocks::VdbSource : public Source {
     bool placed_ = false;
 };
 
-MapBlocks::MapBlocks(const fs::path& path, const MapReadOptions& options, const Progress& progress) {
+MapBlocks::MapBlocks(const fs::path& path, const MapReadOptions& options, const Progress& progress)
+    : name_(path.string()) {
     options.check();
     std::error_code error;
     if (fs::is_directory(path, error))
@@ -167,6 +161,14 @@ const MapFile& MapBlocks::whole() const { return source_->whole; }
 const CoordBBox& MapBlocks::box() const { return source_->box; }
 const std::array<int, 3>& MapBlocks::order() const { return source_->order; }
 std::uint64_t MapBlocks::memory() const { return source_->memory(); }
+void MapBlocks::require_active_in_box() const {
+    if (!source_->has_active_beyond_box()) return;
+    const Vec3i& size = frame().size;
+    throw InvalidInput(
+        fmt::format("{}: the grid has active voxels outside its box of {} x {} x {}, which cannot be "
+                    "done part by part",
+                    name_, size.x(), size.y(), size.z()));
+}
 
 DensityMap MapBlocks::read(const CoordBBox& wanted, const Progress& progress) const {
     const DensityMap& whole = source_->whole.map;

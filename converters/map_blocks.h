@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "converters/map_file.h"
 #include "vdbgeo/core/progress.h"
@@ -40,6 +41,10 @@ class MapBlocks {
     const std::array<int, 3>& order() const;
     /// Bytes that are held between reads.
     std::uint64_t memory() const;
+    /// InvalidInput where a VDB grid has active voxels outside the leaves that touch box(), as the band of a
+    /// level set may: operators on the whole grid change them too, those on blocks cannot. Surfaces end at
+    /// the box and need not ask.
+    void require_active_in_box() const;
 
     /// The leaves and tiles of the map that touch the box, in a grid with the metadata, the transform and the
     /// background of the whole; so are frame and statistics. What else a reader finds there is background.
@@ -53,6 +58,7 @@ class MapBlocks {
     template <class Leaves>
     class VdbSource;
 
+    std::string name_;
     std::unique_ptr<Source> source_;
 };
 

@@ -96,6 +96,7 @@ openvdb::FloatGrid::Ptr empty_grid(const std::filesystem::path& path, const MapR
 MapFile part_of_grid(const std::filesystem::path& path, const MapReadOptions& options, const MapPart& part,
                      const Progress& progress) {
     const MapBlocks map(path, options);
+    if (!part.box_only) map.require_active_in_box();
     MapFile result = map.whole();
     result.map = map.read(part.wanted, progress);
     openvdb::FloatTree& tree = result.map.grid->tree();

@@ -11,6 +11,9 @@ struct MapPart {
     Team* team = nullptr;
     openvdb::CoordBBox own;     ///< boxes of all members cover the map, each voxel once; at multiples of 8
     openvdb::CoordBBox wanted;  ///< own box and ghosts: leaves and tiles that reach into it are kept
+    /// What a VDB grid has outside its box does not count, as in surfaces; else active voxels outside the
+    /// leaves that touch the box are InvalidInput.
+    bool box_only = false;
 };
 
 /// The frame of the map that read_map_part would read parts of: the header is all that is looked at, of a VDB

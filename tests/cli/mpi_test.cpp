@@ -1,5 +1,7 @@
 // vdbgeo-mpi under mpirun: the bytes of vdbgeo, for any number of processes.
+#include "converters/map_file.h"
 #include "tests/cli/mpi_run.h"
+#include "vdbgeo/surface/level_set.h"
 
 using namespace vdbgeo::test;
 
@@ -123,6 +125,12 @@ TEST_F(Mpi, ExtractsTheSameSurface) {
     good({"phantom", "sphere", at("ball.mrc"), "--size", "160", "--quiet"});
     good({"convert", at("ball.mrc"), at("shell.vdb"), "--threshold", "0", "--band", "9", "--quiet"});
     expect_same({"surface", at("shell.vdb"), "--iso", "0"}, ".ply", {2});
+    // Its band goes beyond the box, where the surface is closed.
+    vdbgeo::write_vdb({vdbgeo::level_set(vdbgeo::read_map(map).map, 1)}, at("ls.vdb"));
+    expect_same({"surface", at("ls.vdb")}, ".ply", {2});
+    const Ended refused = mpi(2, {"denoise", at("ls.vdb"), at("b.vdb")});
+    EXPECT_EQ(refused.code, 3) << refused.err;
+    EXPECT_NE(refused.err.find("outside its box"), std::string::npos) << refused.err;
     const Ended r = mpi(2, {"surface", map, at("b.ply"), "--iso", "1", "--json"});
     const Json told = Json::parse(r.out, nullptr, false),
                alone = json({"surface", map, at("c.ply"), "--iso", "1"});

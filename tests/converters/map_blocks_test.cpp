@@ -249,14 +249,14 @@ TEST_F(MapBlocksTest, FoldersOfParts) {
     for (const CoordBBox& box : boxes(blocks.box())) expect_part(*blocks.read(box).grid, *map.grid, box);
 }
 
-TEST_F(MapBlocksTest, VoxelsBeyondTheBoxAreRefused) {
+TEST_F(MapBlocksTest, VoxelsBeyondTheBoxAreRefusedWhereAsked) {
     const DensityMap map = test::map_from_values(Vec3i(30, 20, 10), test::noise(30 * 20 * 10, 3));
     map.grid->tree().setValue(Coord(31, 23, 15), 1);  // in the box's last leaf
     write_vdb({map.grid}, folder_ / "a.vdb");
-    EXPECT_NO_THROW(MapBlocks(folder_ / "a.vdb"));
+    EXPECT_NO_THROW(MapBlocks(folder_ / "a.vdb").require_active_in_box());
     map.grid->tree().setValue(Coord(5, 24, 3), 1);
     write_vdb({map.grid}, folder_ / "a.vdb");
-    EXPECT_THROW(MapBlocks(folder_ / "a.vdb"), InvalidInput);
+    EXPECT_THROW(MapBlocks(folder_ / "a.vdb").require_active_in_box(), InvalidInput);
 }
 
 TEST_F(MapBlocksTest, ErrorsAreThoseOfReadMap) {
